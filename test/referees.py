@@ -268,6 +268,12 @@ def friction(p: Parameters, rates: Array) -> Array:
     return f
 
 
+def reflected(p: Parameters) -> Array:
+    """Return the masses or inertias of rotors at the drives (6,)."""
+    value: Array = p[p.leg_kind.fields['reflected_mass']]
+    return value
+
+
 class PinocchioReferee:
     """
     Leg forces and base wrench by the recursive Newton-Euler algorithm of Pinocchio.

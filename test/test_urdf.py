@@ -12,11 +12,12 @@ import sys
 from typing import Any
 from xml.etree import ElementTree as ET
 
+from legs_of_all_kinds import efforts_of, KINDS, random_hexapod
 import numpy as np
 import pytest
 from referees import (
-    Array, each_relative, friction, random_motion, random_parameters, rng, rotation_about,
-    smooth_motion)
+    Array, each_relative, friction, random_parameters, reflected, rng,
+    rotation_about)
 from snapshot import Snapshot
 
 from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
@@ -45,7 +46,7 @@ class Tree:
         self.joints = TreeJoints(p)
         self.places = [self.model.joints[self.model.getJointId(name)].idx_q
                        for name in self.joints.names]
-        self.pistons = [self.model.getFrameId(f'{leg}_piston') for leg in p['joints']]
+        self.ends = [self.model.getFrameId(leg.end_frame) for leg in Hexapod(p).legs]
         self.balls = [self.model.getFrameId(f'{leg}_platform_joint') for leg in p['joints']]
         self.platform = self.model.getFrameId(p['platform_frame'], pin.BODY)
 
@@ -63,8 +64,8 @@ class Tree:
         assert np.abs(platform.translation - pose.position).max() < CLOSED
         assert np.abs(platform.rotation - pose.rotation).max() < CLOSED
         return float(max(
-            np.linalg.norm(frames[piston].translation - frames[ball].translation)
-            for piston, ball in zip(self.pistons, self.balls, strict=True)))
+            np.linalg.norm(frames[end].translation - frames[ball].translation)
+            for end, ball in zip(self.ends, self.balls, strict=True)))
 
     def forces(self, p: Parameters, motion: Motion) -> Array:
         """Return the leg forces of one sample: the tree's, its loops closed by constraints."""
@@ -73,18 +74,18 @@ class Tree:
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
         full = pin.LOCAL_WORLD_ALIGNED
-        loops = [pin.getFrameJacobian(model, data, piston, full)[:3]
+        loops = [pin.getFrameJacobian(model, data, end, full)[:3]
                  - pin.getFrameJacobian(model, data, ball, full)[:3]
-                 for piston, ball in zip(self.pistons, self.balls, strict=True)]
+                 for end, ball in zip(self.ends, self.balls, strict=True)]
         # Closed loops and the platform's twist determine the rates of all joints.
         all_rows = np.vstack([*loops, pin.getFrameJacobian(model, data, self.platform, full)])
         twist = np.concatenate([motion.linear_velocity, motion.angular_velocity])
         freedoms = np.linalg.solve(all_rows, np.vstack([np.zeros((18, 6)), np.eye(6)]))
         v = freedoms @ twist
         pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
-        drift = [pin.getFrameClassicalAcceleration(model, data, piston, full).linear
+        drift = [pin.getFrameClassicalAcceleration(model, data, end, full).linear
                  - pin.getFrameClassicalAcceleration(model, data, ball, full).linear
-                 for piston, ball in zip(self.pistons, self.balls, strict=True)]
+                 for end, ball in zip(self.ends, self.balls, strict=True)]
         own = pin.getFrameClassicalAcceleration(model, data, self.platform, full)
         a = np.linalg.solve(all_rows, np.concatenate([
             -np.concatenate(drift), motion.linear_acceleration - own.linear,
@@ -94,22 +95,24 @@ class Tree:
         legs = [model.joints[model.getJointId(name)].idx_v for name in p['joints']]
         pushes = np.linalg.solve(freedoms[legs].T, freedoms.T @ tau)
         # Terms that are not in a URDF, or left out by Pinocchio's recursion.
-        forces: Array = pushes + p['actuator.reflected_mass'] * a[legs] + friction(p, v[legs])
+        forces: Array = pushes + reflected(p) * a[legs] + friction(p, v[legs])
         return forces
 
 
+@pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('seed', range(3))
-def test_leg_forces_by_pinocchio_from_the_urdf_are_the_same(seed):
-    p = random_parameters(rng(seed))
-    tree, motions = Tree(p), random_motion(p, rng(seed), 20)
-    forces = StewartPlatform(p).inverse_dynamics(motions).forces
-    assert each_relative([tree.forces(p, motion) for motion in motions], forces) < FORCES
+def test_efforts_by_pinocchio_from_the_urdf_are_the_same(seed, kind):
+    p, motions = random_hexapod(kind, seed, 20)
+    tree = Tree(p)
+    efforts = efforts_of(p, motions)
+    assert each_relative([tree.forces(p, motion) for motion in motions], efforts) < FORCES
 
 
+@pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('seed', range(3))
-def test_the_joints_of_a_motion_close_all_loops_of_the_urdf(seed):
-    p = random_parameters(rng(seed))
-    tree, motions = Tree(p), smooth_motion(p, rng(seed))(np.linspace(0.0, 5.0, 100))
+def test_the_joints_of_a_motion_close_all_loops_of_the_urdf(seed, kind):
+    p, motions = random_hexapod(kind, seed, 100)
+    tree = Tree(p)
     rows = tree.joints.positions(motions.position, motions.rotation)
     assert max(tree.gap(motion, row) for motion, row in zip(motions, rows, strict=True)) < CLOSED
 
@@ -259,10 +262,13 @@ def test_two_bodies_or_joints_of_the_same_name_are_rejected(
 
 
 @pytest.mark.skipif(not hasattr(pin, 'RigidConstraintModel'), reason='needs Pinocchio 3')
+@pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('seed', range(3))
-def test_loops_of_robot_yaml_give_the_closed_mechanism_in_pinocchio(seed):
+def test_loops_of_robot_yaml_give_the_closed_mechanism_in_pinocchio(seed, kind):
     """As Gepetto's loader makes them: ball joints between frames; then constrained dynamics."""
-    p = random_parameters(rng(seed), actuators=False)
+    p, motions = random_hexapod(kind, seed, 1)
+    p = p.replaced({'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0,
+                    p.leg_kind.fields['reflected_mass']: 0.0})
     closed = yaml.safe_load(loops_yaml(Hexapod(p), 'hexapod'))
     assert closed['type'] == ['3d'] * 6 and closed['name_mot'] == list(p['joints'])
     tree = Tree(p)
@@ -276,7 +282,7 @@ def test_loops_of_robot_yaml_give_the_closed_mechanism_in_pinocchio(seed):
             second.parentJoint, second.placement, pin.ReferenceFrame.LOCAL))
     for each in constraints:
         datas.append(each.createData())
-    pose = random_motion(p, rng(seed), 1)[0].pose
+    pose = motions[0].pose
     q = tree.configuration(tree.joints.positions(pose.position, pose.rotation))
     forces = 100.0 * rng(seed).normal(size=6)
     torques = np.zeros(model.nv)

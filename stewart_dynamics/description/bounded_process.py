@@ -14,7 +14,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-from stewart_dynamics.description.mechanism import DescriptionError
+from stewart_dynamics.legs.mechanism import DescriptionError
 from stewart_dynamics.errors import one_line
 
 _TIME = 30  # [s]

@@ -4,31 +4,33 @@
 """
 A hexapod as the writers of all formats need it: names, frames, bodies and shapes.
 
-The axes of a leg's cylinder and piston are those of its mount at home: z along the leg. The origin
-of the cylinder is the base joint, that of the piston the platform joint. Shapes are plates,
+A leg has two bodies, whose joints and axes ``LegBranch`` has. Shapes are plates,
 cylinders and balls, or meshes from files; their sizes follow from the geometry, as those of the
 node's markers do, and have no influence on masses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.mechanism import WORLD
 from stewart_dynamics.errors import ParameterError, shown
+from stewart_dynamics.legs.mechanism import UNIVERSAL, WORLD
+from stewart_dynamics.legs.tree import (
+    BALL, LegBranch, LegLink, PLATE, UNIVERSAL_JOINTS, VisualShape)
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.kinematics.home_pose import homes, level_axes
-from stewart_dynamics.mechanics.kinematics.leg_joints import joint_names, mounts, PLATFORM_JOINTS
+from stewart_dynamics.mechanics.kinematics.home_pose import choose_branch, homes, level_axes
+from stewart_dynamics.mechanics.kinematics.leg_joints import joint_names, mounts
 from stewart_dynamics.parameters.table import inertia_matrix, mean_radius, Parameters
 
 # A body that a tool simulates needs mass and inertia about each axis. What a parameter file gives
 # as zero is replaced by these: the forces of a hexapod change by about 5e-4 of the largest.
 _LEAST_MASS = 1e-4  # of the platform's
 _LEAST_GYRATION = 0.1  # of the leg at home
+_HALF = 0.6  # of the inertia about z, about other axes: a body has more than half of it
 AXIAL_INERTIA = 1e-6
 """Inertia of a leg's part about its own axis, in terms of the transverse one, where a format
 requires one: in the model it is zero."""
@@ -39,8 +41,7 @@ _FRAME_MASS, _FRAME_GYRATION = 1e-8, 0.1
 
 PASSIVE_RATE = 1000.0
 """Limit of passive joints in formats that require a limit of every joint [m/s, rad/s]."""
-_UNLIMITED_LENGTH = 10.0  # longest leg without a limit, in terms of its length at home
-UNLIMITED = 1e9  # force or rate of a leg without a limit, where a format requires one [N, m/s]
+UNLIMITED = 1e9  # effort or rate of a leg without a limit, where a format requires one
 
 
 class RigidBody(NamedTuple):
@@ -62,35 +63,62 @@ class LegDescription(NamedTuple):
 
     name: str
     cross: str  # name of the massless body between the joints of the universal joint
-    bearing: str  # name of the body fixed to the base that has the axes of the mount, in MJCF
+    bearing: str  # name of the body that has the axes of the mount, in MJCF
     universal: tuple[str, str]  # names of these joints
     ball: str  # name of the joint at the platform, and of the frame on the platform where it is
     tip: str  # name of the end of the leg there
     base_joint: Array  # base frame (3,) [m]
     platform_joint: Array  # platform frame (3,) [m]
-    mount: Array  # axes of the mount to base axes (3, 3)
-    zero_length: float
-    home_length: float  # [m]
-    cylinder: RigidBody
-    piston: RigidBody
-    reflected_mass: float
+    branch: LegBranch
+    bodies: tuple[RigidBody, RigidBody]  # of its links
+    reflected: float  # mass or inertia
     viscous_friction: float
     coulomb_friction: float
-    limits: LegLimits
+    limits: DriveLimits
+
+    @property
+    def links(self) -> Iterator[tuple[LegLink, RigidBody]]:
+        """Return its links with their bodies, from the base on."""
+        return zip(self.branch.links, self.bodies, strict=True)
+
+    @property
+    def drive(self) -> LegLink:
+        """Return the link that the drive moves."""
+        return next(link for link in self.branch.links if link.joint != UNIVERSAL)
+
+    @property
+    def last(self) -> RigidBody:
+        """Return the body at the platform."""
+        return self.bodies[-1]
+
+    @property
+    def end_frame(self) -> str:
+        """Return the name of the frame on it whose origin is the joint at the platform."""
+        return self.tip if self.branch.end.any() else self.last.name
+
+    @property
+    def at_home(self) -> float:
+        """Return the position of the joint of the drive at home [m, rad]."""
+        return self.branch.home - self.branch.zero
+
+    def carrier(self, link: LegLink, base: str) -> str:
+        """Return the name of the body before a link; ``base`` is that of the base."""
+        return base if link is self.branch.links[0] else self.bodies[0].name
+
+    def bounds(self) -> tuple[float, float]:
+        """Return the limits of its position, wide bounds where it is unlimited [m, rad]."""
+        widest, limits = self.branch.widest, self.limits
+        return (widest[0] if limits.lowest is None else limits.lowest,
+                widest[1] if limits.highest is None else limits.highest)
 
 
-class LegLimits(NamedTuple):
-    """The limits of a leg; None where it is unlimited."""
+class DriveLimits(NamedTuple):
+    """The limits of a drive; None where it is unlimited."""
 
-    length_min: float | None
-    length_max: float | None
-    velocity_max: float | None
-    force_max: float | None
-
-    def lengths(self, home_length: float) -> tuple[float, float]:
-        """Return the shortest and longest length [m], wide bounds where a leg is unlimited."""
-        return (0.0 if self.length_min is None else self.length_min,
-                _UNLIMITED_LENGTH * home_length if self.length_max is None else self.length_max)
+    lowest: float | None
+    highest: float | None
+    rate: float | None
+    effort: float | None
 
 
 class Hexapod:
@@ -104,6 +132,7 @@ class Hexapod:
         # Platform and payload are one body in all formats.
         self.parameters = parameters = parameters.merged()
         self.joints = joint_names(parameters)
+        choose_branch(parameters)
         positions, rotations = homes(parameters)
         self.position, self.rotation = positions[0], rotations[0]
         self.base, self.platform = parameters.base_frame, parameters.platform_frame
@@ -112,15 +141,22 @@ class Hexapod:
         self.platform_body = RigidBody(
             self.platform, parameters.platform.mass, parameters.platform.center_of_mass,
             inertia_matrix(parameters.platform.inertia))
-        directions = mounts(parameters)
-        self.legs = tuple(self._leg(n, directions[n]) for n in range(6))
+        size = mean_radius(parameters.geometry.platform_joints)
+        self.kind = parameters.leg_kind
+        branches = self.kind.branches(
+            parameters, self.position, self.rotation, mounts(parameters), size)
+        self.legs = tuple(self._leg(n, branch) for n, branch in enumerate(branches))
+        lower, upper = self.kind.parts
+        self.colors = {'base': COLORS['base'], 'platform': COLORS['platform'],
+                       lower: COLORS['lower'], upper: COLORS['upper'], 'joint': COLORS['joint']}
+        """Colors of base, platform, parts of legs and joints."""
         self._check_names()
 
     def _check_names(self) -> None:
         """Raise ParameterError where a name is taken; some formats have one list for all."""
         names = [WORLD, self.base_body, self.platform, *self.joints]
         for leg in self.legs:
-            names += [leg.cross, leg.bearing, leg.cylinder.name, leg.piston.name, leg.ball,
+            names += [leg.cross, leg.bearing, *(body.name for body in leg.bodies), leg.ball,
                       leg.tip]
         twice = [name for n, name in enumerate(names) if name in names[:n]]
         if twice:
@@ -129,34 +165,31 @@ class Hexapod:
                 f'{shown(list(self.parameters.joints))}: the name {shown(twice[0])} would be '
                 'there twice')
 
-    def _leg(self, n: int, mount: Array) -> LegDescription:
+    def _leg(self, n: int, branch: LegBranch) -> LegDescription:
         p = self.parameters
-        first, second, name = self.joints[len(PLATFORM_JOINTS) + 3 * n:][:3]
-        base, platform = p.geometry.base_joints[n], p.geometry.platform_joints[n]
-        length = float(np.linalg.norm(self.position + self.rotation @ platform - base))
+        name = p.joints[n]
+        low, high = self.kind.position_limits
         return LegDescription(
-            name, f'{name}_cross', f'{name}_mount', (first, second),
-            f'{name}_platform_joint', f'{name}_tip', base, platform, mount,
-            float(p.geometry.zero_length[n]), length,
-            self._part(n, 'cylinder', 1.0), self._part(n, 'piston', -1.0),
-            float(p.actuator.reflected_mass[n]), float(p.actuator.viscous_friction[n]),
-            float(p.actuator.coulomb_friction[n]),
-            LegLimits(*(None if p[f'limits.{each}'] is None else float(p[f'limits.{each}'][n])
-                        for each in LegLimits._fields)))
+            name, f'{name}_cross', f'{name}_mount',
+            (f'{name}_{UNIVERSAL_JOINTS[0]}', f'{name}_{UNIVERSAL_JOINTS[1]}'),
+            f'{name}_platform_joint', f'{name}_tip', p.geometry.base_joints[n],
+            p.geometry.platform_joints[n], branch,
+            (_body(name, branch.links[0]), _body(name, branch.links[1])),
+            float(p[self.kind.fields['reflected_mass']][n]),
+            float(p.actuator.viscous_friction[n]), float(p.actuator.coulomb_friction[n]),
+            DriveLimits(*(None if p[each] is None else float(p[each][n]) for each in (
+                low, high, self.kind.rate_limit, self.kind.effort_limit))))
 
-    def _part(self, n: int, part: str, sign: float) -> RigidBody:
-        of_part = self.parameters.legs.parts[part]
-        across = float(of_part.inertia[n])
-        center = sign * float(of_part.center_of_mass[n])
-        return RigidBody(f'{self.parameters.joints[n]}_{part}', float(of_part.mass[n]),
-                         np.array([0.0, 0.0, center + 0.0]), np.diag([across, across, 0.0]))
-
-    def solid(self, body: RigidBody, leg: LegDescription) -> RigidBody:
+    def solid(self, link: LegLink, body: RigidBody) -> RigidBody:
         """Return a leg's body with mass and inertia about all axes, as tools need it."""
         mass = body.mass or _LEAST_MASS * self.platform_body.mass
-        across = float(body.inertia[0, 0]) or mass * (_LEAST_GYRATION * leg.home_length) ** 2
-        return body._replace(mass=mass, inertia=np.diag([
-            across, across, AXIAL_INERTIA * across]))
+        moments = np.linalg.eigvalsh(body.inertia)
+        if not link.slender and moments[0] > 0.0 and moments[:2].sum() >= moments[2]:
+            return body._replace(mass=mass)
+        across = float(body.inertia[0, 0] if link.slender else body.inertia[2, 2]) or (
+            mass * (_LEAST_GYRATION * link.size) ** 2)
+        return body._replace(mass=mass, inertia=across * np.diag(
+            [1.0, 1.0, AXIAL_INERTIA] if link.slender else [_HALF, _HALF, 1.0]))
 
     def frame_body(self, name: str) -> RigidBody:
         """Return a body of a mass that has no influence, where a frame needs one."""
@@ -164,30 +197,16 @@ class Hexapod:
         return RigidBody(name, mass, np.zeros(3), mass * _FRAME_GYRATION ** 2 * np.eye(3))
 
 
+def _body(leg: str, link: LegLink) -> RigidBody:
+    return RigidBody(f'{leg}_{link.part}', link.mass, link.center, link.inertia)
+
+
 Color = tuple[float, float, float, float]
 
 COLORS: dict[str, Color] = {
     'base': (0.3, 0.32, 0.35, 1.0), 'platform': (0.62, 0.7, 0.76, 1.0),
-    'cylinder': (0.45, 0.48, 0.52, 1.0), 'piston': (0.9, 0.9, 0.9, 1.0),
+    'lower': (0.45, 0.48, 0.52, 1.0), 'upper': (0.9, 0.9, 0.9, 1.0),
     'joint': (0.12, 0.12, 0.12, 1.0)}
-
-# Radii and thickness in terms of the mean distance of the platform joints from their center.
-BARREL, ROD, BALL, PLATE = 0.05, 0.0275, 0.07, 0.05
-# Parts of the shortest leg length, or of the length at home if there is no limit.
-BARREL_LENGTH, _ROD_LENGTH, _OF_HOME = 0.9, 0.95, 0.7
-
-
-class VisualShape(NamedTuple):
-    """A cylinder along z, a ball, or a mesh; placed in the axes of its body."""
-
-    kind: str  # cylinder, sphere or mesh
-    color: str  # a key of COLORS
-    position: Array  # of its center, or of the mesh's origin (3,) [m]
-    rotation: Array  # its axes to those of the body (3, 3)
-    radius: float = 0.0
-    length: float = 0.0
-    file: str = ''
-    scale: float = 1.0
 
 
 def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[VisualShape, ...]]:
@@ -201,25 +220,14 @@ def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[VisualShape, 
         found[name] = _mesh(hexapod, kind, uris) or (_plate(kind, joints, PLATE * size), *(
             VisualShape('sphere', 'joint', joint, np.eye(3), BALL * size) for joint in joints))
     for leg in hexapod.legs:
-        found[leg.cylinder.name] = _mesh(hexapod, 'cylinder', uris) or (
-            _rod('cylinder', BARREL * size, BARREL_LENGTH * _shortest(leg), 1.0),)
-        found[leg.piston.name] = _mesh(hexapod, 'piston', uris) or (
-            _rod('piston', ROD * size, _ROD_LENGTH * _shortest(leg), -1.0),)
+        for link, body in leg.links:
+            found[body.name] = _mesh(hexapod, link.part, uris) or link.shapes
     return found
 
 
 def solids(looks: Sequence[VisualShape]) -> list[VisualShape]:
     """Return which shapes of a body others collide with: not the balls of its joints."""
     return [shape for shape in looks if shape.kind != 'sphere']
-
-
-def _shortest(leg: LegDescription) -> float:
-    return leg.limits.length_min or _OF_HOME * leg.home_length
-
-
-def _rod(kind: str, radius: float, length: float, sign: float) -> VisualShape:
-    return VisualShape('cylinder', kind, np.array([0.0, 0.0, 0.5 * sign * length]), np.eye(3),
-                       radius, length)
 
 
 def _plate(kind: str, joints: Array, thickness: float) -> VisualShape:
@@ -231,7 +239,7 @@ def _plate(kind: str, joints: Array, thickness: float) -> VisualShape:
 
 def _mesh(hexapod: Hexapod, kind: str, uris: bool) -> tuple[VisualShape, ...]:
     p = hexapod.parameters
-    file: str = p[f'meshes.{kind}']
+    file: str = p[f'meshes.{kind}'] if f'meshes.{kind}' in p else ''
     if not file or (not uris and '://' in file):
         return ()
     offset: Array = p[f'meshes.{kind}_offset']

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from stewart_dynamics import __version__
 from stewart_dynamics.description.hexapod import Hexapod
-from stewart_dynamics.description.mechanism import BALL, DescriptionError, FIXED
+from stewart_dynamics.legs.mechanism import BALL, DescriptionError, FIXED
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.parameters.yaml_file import read_document
 
@@ -43,7 +43,7 @@ def loops_name(name: str) -> str:
 
 def loops_yaml(hexapod: Hexapod, name: str) -> str:
     """Return the text of the file for a URDF of this name."""
-    pairs = ''.join(f'- [{leg.ball}, {leg.piston.name}]\n' for leg in hexapod.legs)
+    pairs = ''.join(f'- [{leg.ball}, {leg.end_frame}]\n' for leg in hexapod.legs)
     motors = ', '.join(leg.name for leg in hexapod.legs)
     return (_HEAD.format(name=name, version=__version__) + f'closed_loop:\n{pairs}'
             f'type: [{", ".join(["3d"] * len(hexapod.legs))}]\nname_mot: [{motors}]\n')

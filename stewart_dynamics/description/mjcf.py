@@ -22,12 +22,13 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
-    COLORS, Hexapod, LegDescription, PLATE, RigidBody, shapes, VisualShape)
+    Hexapod, LegDescription, RigidBody, shapes)
 from stewart_dynamics.description.xml_text import (
-    add, base_element, CARRIED, carried, ELEMENT, length_elements, numbers, solid_elements,
+    add, base_element, CARRIED, carried, ELEMENT, numbers, position_elements, solid_elements,
     text_of)
+from stewart_dynamics.legs.mechanism import SLIDE, UNIVERSAL
+from stewart_dynamics.legs.tree import PLATE, VisualShape
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
 from stewart_dynamics.parameters.table import mean_radius
 
 _TIMESTEP = 0.0005  # [s]
@@ -40,8 +41,8 @@ SOLREF_LOOP = (0.01, 1.0)
 SOLIMP = (0.9999, 0.9999, 0.001)
 _TOLERANCE = 1e-12
 _CLASS, _VISUAL, _COLLISION = 'hexapod', 'visual', 'collision'  # defaults
-_NOT_IN_MJCF = ('limits.velocity_max',)
-_COMMENT = 'It starts at the home pose. ctrl: the forces of the legs in N, a positive one pushes.'
+_COMMENT = ('It starts at the home pose. ctrl: the {effort}s of the legs in {unit}, '
+            'a positive one {does}.')
 
 
 def mjcf(hexapod: Hexapod, name: str) -> str:
@@ -60,7 +61,7 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
         conaffinity='0', mass='0')
     add(add(root, 'visual'), 'headlight', ambient='0.4 0.4 0.4', diffuse='0.5 0.5 0.5')
     looks = shapes(hexapod, uris=False)  # MuJoCo knows paths alone
-    _assets(root, looks)
+    _assets(root, hexapod, looks)
     world = add(root, 'worldbody')
     base = add(world, 'body', name=hexapod.base_body, childclass=_CLASS)
     _geoms(base, looks[hexapod.base])
@@ -71,16 +72,19 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     _actuators(root, hexapod)
     add(add(root, 'keyframe'), 'key', name='home', qpos=numbers(*_home(hexapod)))
     custom = add(root, 'custom')
-    unlimited = (LENGTH_MIN, LENGTH_MAX) if p[LENGTH_MIN] is p[LENGTH_MAX] else ()
+    low, high = hexapod.kind.position_limits
+    unlimited = (low, high) if p[low] is p[high] else ()
     elements = {**base_element(hexapod), **solid_elements(hexapod),
-                **length_elements(hexapod), **dict.fromkeys(unlimited)}
-    if p['limits.force_max'] is None:
-        elements['limits.force_max'] = None
-    for each, parameter in carried(p, elements, _NOT_IN_MJCF):
+                **position_elements(hexapod), **dict.fromkeys(unlimited)}
+    if p[hexapod.kind.effort_limit] is None:
+        elements[hexapod.kind.effort_limit] = None
+    for each, parameter in carried(p, elements, (hexapod.kind.rate_limit,)):
         add(custom, 'text', name=f'{CARRIED}.{each}', data=parameter.value)
         if parameter.element:
             add(custom, 'text', name=f'{ELEMENT}.{each}', data=parameter.element)
-    return text_of(root, _COMMENT)
+    effort = hexapod.kind.effort
+    return text_of(root, _COMMENT.format(
+        effort=effort.name, unit=effort.unit, does=effort.positive.removeprefix('+ ')))
 
 
 def scene(hexapod: Hexapod, name: str) -> str:
@@ -109,7 +113,8 @@ def scene(hexapod: Hexapod, name: str) -> str:
 
 def _home(hexapod: Hexapod) -> list[Array]:
     """Return the positions of all joints at home, in MuJoCo's order."""
-    legs = [np.array([0.0, 0.0, leg.home_length - leg.zero_length]) for leg in hexapod.legs]
+    legs = [np.array([leg.at_home] if link.joint != UNIVERSAL else [0.0, 0.0])
+            for leg in hexapod.legs for link, _ in leg.links]
     x, y, z, w = to_quaternion(hexapod.rotation)
     return [*legs, hexapod.position, np.array([w, x, y, z])]
 
@@ -117,27 +122,35 @@ def _home(hexapod: Hexapod) -> list[Array]:
 def _leg(base: ET.Element, hexapod: Hexapod, leg: LegDescription,
          looks: dict[str, tuple[VisualShape, ...]]) -> None:
     add(base, 'site', name=f'{leg.name}_base_joint', pos=numbers(leg.base_joint))
-    # A body of its own has the turn of the mount: Drake takes the first of two joints of a body in
-    # axes of the body's parent.
-    mount = add(base, 'body', name=leg.bearing, pos=numbers(leg.base_joint),
-                quat=_quaternion(leg.mount))
-    cylinder = add(mount, 'body', name=leg.cylinder.name)
-    for joint, axis in zip(leg.universal, ('1 0 0', '0 1 0'), strict=True):
-        add(cylinder, 'joint', name=joint, type='hinge', axis=axis)
-    _inertial(cylinder, hexapod.solid(leg.cylinder, leg))
-    _geoms(cylinder, looks[leg.cylinder.name])
-    piston = add(cylinder, 'body', name=leg.piston.name, pos=numbers([0, 0, leg.home_length]))
-    slide = add(piston, 'joint', name=leg.name, type='slide', axis='0 0 1',
-                ref=numbers(leg.home_length - leg.zero_length),
-                armature=numbers(leg.reflected_mass), damping=numbers(leg.viscous_friction),
+    parent = base
+    for link, body in leg.links:
+        at = {'pos': numbers(link.at_home.position), 'quat': _quaternion(link.at_home.rotation)}
+        if link.joint == UNIVERSAL:
+            # A body of its own has the turn of the mount: Drake takes the first of two joints of a
+            # body in axes of the body's parent.
+            parent = add(add(parent, 'body', name=leg.bearing, **at), 'body', name=body.name)
+            for joint, axis in zip(leg.universal, ('1 0 0', '0 1 0'), strict=True):
+                add(parent, 'joint', name=joint, type='hinge', axis=axis)
+        else:
+            if link.joint == SLIDE:
+                del at['quat']
+            parent = add(parent, 'body', name=body.name, **at)
+            _drive(parent, leg, link.joint)
+        _inertial(parent, hexapod.solid(link, body))
+        _geoms(parent, looks[body.name])
+    tip = add(parent, 'site', name=leg.tip)
+    if leg.branch.end.any():
+        tip.set('pos', numbers(leg.branch.end))
+
+
+def _drive(body: ET.Element, leg: LegDescription, kind: str) -> None:
+    drive = add(body, 'joint', name=leg.name, type=kind, axis='0 0 1',
+                ref=numbers(leg.at_home),
+                armature=numbers(leg.reflected), damping=numbers(leg.viscous_friction),
                 frictionloss=numbers(leg.coulomb_friction), solreffriction=numbers(_SOLREF),
                 solimpfriction=numbers(SOLIMP), solreflimit=numbers(_SOLREF))
-    if leg.limits.length_min is not None or leg.limits.length_max is not None:
-        slide.set('range', numbers(
-            np.subtract(leg.limits.lengths(leg.home_length), leg.zero_length)))
-    _inertial(piston, hexapod.solid(leg.piston, leg))
-    _geoms(piston, looks[leg.piston.name])
-    add(piston, 'site', name=leg.tip)
+    if leg.limits.lowest is not None or leg.limits.highest is not None:
+        drive.set('range', numbers(np.subtract(leg.bounds(), leg.branch.zero)))
 
 
 def _platform(world: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) -> None:
@@ -156,8 +169,10 @@ def _loops(root: ET.Element, hexapod: Hexapod) -> None:
     for leg in hexapod.legs:
         # By bodies, as all readers know it, not by sites; on the platform the point is where it is
         # in the pose of the file.
-        add(equality, 'connect', name=leg.ball, body1=leg.piston.name, body2=hexapod.platform,
-            anchor=numbers(np.zeros(3)), solref=numbers(SOLREF_LOOP), solimp=numbers(SOLIMP))
+        add(equality, 'connect', name=leg.ball, body1=leg.last.name, body2=hexapod.platform,
+            anchor=numbers(leg.branch.end), solref=numbers(SOLREF_LOOP), solimp=numbers(SOLIMP))
+        if leg.drive.joint != SLIDE:
+            continue
         # It has no stiffness: it measures the length from joint to joint.
         length = add(tendons, 'spatial', name=leg.name, rgba='0 0 0 0')
         add(length, 'site', site=f'{leg.name}_base_joint')
@@ -169,19 +184,22 @@ def _actuators(root: ET.Element, hexapod: Hexapod) -> None:
     sensors = add(root, 'sensor')
     for leg in hexapod.legs:
         motor = add(actuators, 'motor', name=leg.name, joint=leg.name)
-        if leg.limits.force_max is not None:
-            motor.set('ctrlrange', numbers(-leg.limits.force_max, leg.limits.force_max))
+        if leg.limits.effort is not None:
+            motor.set('ctrlrange', numbers(-leg.limits.effort, leg.limits.effort))
+    kind = hexapod.kind
+    for quantity, tag in ((kind.position, 'pos'), (kind.rate, 'vel')):
+        for leg in hexapod.legs:
+            sensed = 'tendon' if leg.drive.joint == SLIDE else 'joint'
+            add(sensors, f'{sensed}{tag}', name=f'{leg.name}_{quantity.name}',
+                **{sensed: leg.name})
     for leg in hexapod.legs:
-        add(sensors, 'tendonpos', name=f'{leg.name}_length', tendon=leg.name)
-    for leg in hexapod.legs:
-        add(sensors, 'tendonvel', name=f'{leg.name}_rate', tendon=leg.name)
-    for leg in hexapod.legs:
-        add(sensors, 'actuatorfrc', name=f'{leg.name}_force', actuator=leg.name)
+        add(sensors, 'actuatorfrc', name=f'{leg.name}_{kind.effort.name}', actuator=leg.name)
 
 
-def _assets(root: ET.Element, looks: dict[str, tuple[VisualShape, ...]]) -> None:
+def _assets(root: ET.Element, hexapod: Hexapod, looks: dict[str, tuple[VisualShape, ...]],
+            ) -> None:
     assets = add(root, 'asset')
-    for color, rgba in COLORS.items():
+    for color, rgba in hexapod.colors.items():
         add(assets, 'material', name=color, rgba=numbers(rgba))
     files = {shape.color: shape for each in looks.values() for shape in each if shape.file}
     for kind, shape in files.items():

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.description.bounded_process import load_in_process, unusable
-from stewart_dynamics.description.mechanism import (
+from stewart_dynamics.legs.mechanism import (
     BALL, CarriedParameter, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER,
     Placement, SLIDE, WORLD)
 from stewart_dynamics.description.xml_text import CARRIED, ELEMENT
@@ -38,11 +38,22 @@ def read_mjcf(source: Path) -> Mechanism:
 
 
 def _mechanism(mujoco: Any, source: Path) -> Mechanism:
-    model = _loaded(mujoco, source)
+    unread = ''
+    try:
+        model = _loaded(mujoco, source, 'load(source)')
+    except DescriptionError as exc:
+        # Meshes of a clone without Git LFS are pointers, and bodies with own masses need none.
+        try:
+            model = _loaded(mujoco, source, 'without_meshes(source)')
+        except DescriptionError:
+            raise exc from None
+        unread = str(exc)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mechanism = Mechanism(str(source), source.stem, _parts(model, data), [],
                           gravity=np.array(model.opt.gravity))
+    if unread:
+        mechanism.remarks.append(f'meshes are left out, all bodies have masses: {unread}')
     _options(mujoco, model, mechanism)
     for body in range(1, model.nbody):
         _joints_of(mujoco, model, data, body, mechanism)
@@ -60,13 +71,32 @@ def _mechanism(mujoco: Any, source: Path) -> Mechanism:
     return mechanism
 
 
-def _loaded(mujoco: Any, source: Path) -> Any:
-    """Return the model that MuJoCo makes of a file; it writes warnings to a MUJOCO_LOG.TXT."""
+_LOADERS = """
+import mujoco
+save, load = mujoco.mj_saveModel, mujoco.MjModel.from_xml_path
+def without_meshes(source):
+    spec = mujoco.MjSpec.from_file(source)
+    if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+        raise ValueError('masses are those of shapes')
+    for geom in [each for each in spec.geoms if each.meshname]:
+        if not geom.parent.explicitinertial and geom.parent.name != 'world':
+            raise ValueError('a mass is that of a mesh')
+        spec.delete(geom)
+    for mesh in [*spec.meshes]:
+        spec.delete(mesh)
+    return spec.compile()
+"""
+
+
+def _loaded(mujoco: Any, source: Path, load: str) -> Any:
+    """
+    Return the model that MuJoCo makes of a file; it writes warnings to a MUJOCO_LOG.TXT.
+
+    load: an expression with the functions of ``_LOADERS``.
+    """
     with tempfile.TemporaryDirectory() as folder:
         model = Path(folder) / 'model.mjb'
-        load_in_process(
-            'MuJoCo', 'import mujoco\nsave, load = mujoco.mj_saveModel, '
-            'mujoco.MjModel.from_xml_path', 'save(load(source), target)', source, model)
+        load_in_process('MuJoCo', _LOADERS, f'save({load}, target)', source, model)
         return mujoco.MjModel.from_binary_path(str(model))
 
 
@@ -143,7 +173,7 @@ def _joints_of(mujoco: Any, model: Any, data: Any, body: int, mechanism: Mechani
                 made.left_out.append('damping that grows with powers of the rate')
         if not _switched_off(mujoco, model, 'FRICTIONLOSS'):
             made.friction = float(model.dof_frictionloss[dof].item())
-        if kind == SLIDE:
+        if kind in (SLIDE, HINGE):
             made.position = float(model.qpos0[model.jnt_qposadr[n]])
             if model.jnt_limited[n] and not _switched_off(mujoco, model, 'LIMIT'):
                 made.lower, made.upper = map(float, model.jnt_range[n])
@@ -220,9 +250,10 @@ def _actuators(mujoco: Any, model: Any, mechanism: Mechanism) -> None:
         if joint is None:
             mechanism.remarks.append(f'{name}: an actuator that acts on no joint is left out')
             continue
-        if joint.kind != SLIDE:
+        if joint.kind not in (SLIDE, HINGE):
             joint.left_out.append(f'actuator {name!r}')
             continue
+        joint.actuators.append(name)
         order.append(joint.name)
         if model.actuator_gear[n, 0] < 0.0:
             mechanism.remarks.append(f'{joint.name}: the gear of its actuator is negative: '
@@ -234,7 +265,7 @@ def _actuators(mujoco: Any, model: Any, mechanism: Mechanism) -> None:
             setattr(joint, key, getattr(joint, key) + square * float(added))
     for n in range(model.njnt):
         joint = joints[_joint_name(model, n)]
-        if joint.kind != SLIDE:
+        if joint.kind not in (SLIDE, HINGE):
             continue
         together = [sum(bounds.get(joint.name, [math.inf]))]
         if model.jnt_actfrclimited[n]:

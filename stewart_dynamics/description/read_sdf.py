@@ -13,12 +13,12 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.mechanism import (
+from stewart_dynamics.legs.mechanism import (
     BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement,
     SLIDE, UNIVERSAL, WORLD)
 from stewart_dynamics.description.read_urdf import (
     body_of, carried_of, numbers_of, shapes_of, unit)
-from stewart_dynamics.description.sdf import DRAKE
+from stewart_dynamics.description.sdf import DRAKE, POSITION
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import INERTIA
@@ -149,6 +149,9 @@ class _Model:
                 raise DescriptionError(f'{self._source}: joint {name!r}: no link {end!r}')
         made = Joint(name, _KINDS.get(joint.get('type', ''), OTHER), parent, child,
                      self.place(name).position)
+        position = joint.findtext(POSITION)
+        if position is not None:
+            made.position = float(numbers_of(position, 1, self._source, f'{name}: position')[0])
         gear = self._number(joint, f'{_DRAKE}gear_ratio', name, 1.0)
         made.armature = gear ** 2 * self._number(joint, f'{_DRAKE}rotor_inertia', name, 0.0)
         made.axes = [self._axis(joint, axis) for axis in (
@@ -170,13 +173,14 @@ class _Model:
         mimic = axis.find('mimic')
         if mimic is not None:
             made.left_out.append(f'mimic of {mimic.get("joint", "")!r}')
-        if made.kind != SLIDE:
+        if made.kind not in (SLIDE, HINGE):
             return
         for field, key in (('lower', 'lower'), ('upper', 'upper'), ('velocity_max', 'velocity'),
                            ('force_max', 'effort')):
             value = self._number(axis, f'limit/{key}', made.name, math.inf)
             if abs(value) < _UNLIMITED and not (value < 0.0 and field.endswith('_max')):
-                setattr(made, field, value)
+                at = 0.0 if field.endswith('_max') else made.position  # where it counts from
+                setattr(made, field, value + at)
 
     def fixed(self, plugin: ET.Element) -> Joint | None:
         """Return the joint by which Gazebo fixes a link of the model to another; None if none."""

@@ -5,27 +5,29 @@
 """
 URDF as a mechanism.
 
-Elements ``constraint``, ``joint`` in a block ``gazebo``, the block of stewart_describe, or a file
-beside it (``loops``) close its loops.
+Elements ``constraint``, ``joint`` in a block ``gazebo``, the block of stewart_describe, a file
+beside it (``loops``), or names of frames (onshape-to-robot) close its loops.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+import re
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.loops import loops_beside
-from stewart_dynamics.description.mechanism import (
+from stewart_dynamics.legs.mechanism import (
     BALL, CarriedParameter, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody,
     OTHER, Placement, SLIDE, UNIVERSAL)
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import INERTIA, inertia_matrix
 
+_CLOSING = re.compile('(closing_.+_)1')
 _LIMITS = 'lower', 'upper', 'velocity', 'effort'
 _TRUE, _FALSE = ('1', 'true'), ('0', 'false')
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
@@ -65,6 +67,10 @@ def read_urdf(root: ET.Element, source: Path) -> Mechanism:
                                  child_anchor=placements[ball].position))
     if not closing:
         closing = [*_beside(source, found, placements)]
+    if not closing:
+        closing = [*_named(placements)]
+        mechanism.remarks += [f'{joint.name}: frames with names of onshape-to-robot: taken as a '
+                              'ball joint' for joint in closing]
     mechanism.joints += {joint.name: joint for joint in closing}.values()
     return mechanism
 
@@ -79,6 +85,16 @@ def _beside(source: Path, joints: Iterable[ET.Element], placements: dict[str, Pl
         first, second = frames[loop.first], frames[loop.second]
         yield Joint(f'{loop.first} to {loop.second}', loop.kind, first, second,
                     placements[first].position, child_anchor=placements[second].position)
+
+
+def _named(placements: Mapping[str, Placement]) -> Iterator[Joint]:
+    """Yield the loops of onshape-to-robot: pairs of frames closing_NAME_1 and closing_NAME_2."""
+    for first in placements:
+        named = _CLOSING.fullmatch(first)
+        second = f'{named[1]}2' if named else ''
+        if second in placements:
+            yield Joint(f'{first} to {second}', BALL, first, second, placements[first].position,
+                        child_anchor=placements[second].position)
 
 
 def _constraint(element: ET.Element, placements: dict[str, Placement], source: Path) -> Joint:

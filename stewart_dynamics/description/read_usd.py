@@ -19,11 +19,12 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.bounded_process import load_in_process, unusable
-from stewart_dynamics.description.mechanism import (
+from stewart_dynamics.legs.mechanism import (
     BALL, CarriedParameter, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER,
     Placement, SLIDE, UNIVERSAL, WORLD)
 from stewart_dynamics.description.usd import (
-    ARMATURE, attribute_name, COULOMB_FRICTION, ELEMENT, RATE_LIMIT, VALUE)
+    ANGULAR, armature, attribute_name, coulomb_friction, ELEMENT, LINEAR, POSITION, rate_limit,
+    VALUE)
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.parameters.table import PARAMETERS, STANDARD_GRAVITY
 
@@ -199,12 +200,16 @@ class _Scene:
         if kind == SLIDE:
             made.anchor = second.position
             made.position = float(made.axes[0] @ (second.position - first.position))
-            self._add_slide(prim, made)
-        elif np.linalg.norm(second.position - first.position) > _TOGETHER or (
-                joint.GetExcludeFromArticulationAttr().Get()):
+            self._add_drive(prim, made, LINEAR, self._length)
+        elif kind == HINGE:
+            self._add_drive(prim, made, ANGULAR, math.radians(1.0))
+        if kind != SLIDE and (np.linalg.norm(second.position - first.position) > _TOGETHER or (
+                joint.GetExcludeFromArticulationAttr().Get())):
             made.child_anchor = second.position
-        made.armature = self._number(prim, ARMATURE, self._mass)
-        made.friction = self._number(prim, COULOMB_FRICTION, self._mass * self._length)
+        axis, arm = (LINEAR, 1.0) if kind == SLIDE else (ANGULAR, self._length)
+        made.armature = self._number(prim, armature(axis), self._mass * arm ** 2)
+        made.friction = self._number(
+            prim, coulomb_friction(axis), self._mass * self._length * arm)
         self.mechanism.joints.append(made)
 
     def _kind(self, prim: Any) -> tuple[str, list[int]]:
@@ -235,27 +240,36 @@ class _Scene:
         limit = self._physics.LimitAPI(prim, axis)
         return bool(limit.GetLowAttr().Get() <= limit.GetHighAttr().Get())
 
-    def _add_slide(self, prim: Any, made: Joint) -> None:
-        """Add the limits and the drive of a prismatic joint."""
-        if prim.IsA(self._physics.PrismaticJoint):
-            joint = self._physics.PrismaticJoint(prim)
-            ends = joint.GetLowerLimitAttr().Get(), joint.GetUpperLimitAttr().Get()
-            made.lower, made.upper = (
-                float(end) * self._length if math.isfinite(end) else None for end in ends)
-        rate = self._number(prim, RATE_LIMIT, self._length, math.inf)
+    def _add_drive(self, prim: Any, made: Joint, axis: str, unit: float) -> None:
+        """Add the limits and the drive of a joint; unit: of its positions [m, rad]."""
+        for schema in (self._physics.PrismaticJoint, self._physics.RevoluteJoint):
+            if prim.IsA(schema):
+                joint = schema(prim)
+                ends = joint.GetLowerLimitAttr().Get(), joint.GetUpperLimitAttr().Get()
+                made.lower, made.upper = (
+                    float(end) * unit if math.isfinite(end) else None for end in ends)
+        position = prim.GetAttribute(POSITION)
+        if position and position.HasAuthoredValue():
+            made.position = float(position.Get())
+            made.lower, made.upper = (None if end is None else end + made.position
+                                      for end in (made.lower, made.upper))
+        rate = self._number(prim, rate_limit(axis), unit, math.inf)
         made.velocity_max = rate if 0.0 < rate < 1e30 else None
-        for axis in ('linear', 'transX', 'transY', 'transZ'):
-            if not prim.HasAPI(self._physics.DriveAPI, axis):
+        names = (LINEAR, 'transX', 'transY', 'transZ') if axis == LINEAR else (
+            ANGULAR, 'rotX', 'rotY', 'rotZ')
+        effort = self._mass * self._length * (self._length if axis == ANGULAR else 1.0)
+        for name in names:
+            if not prim.HasAPI(self._physics.DriveAPI, name):
                 continue
-            drive = self._physics.DriveAPI(prim, axis)
+            drive = self._physics.DriveAPI(prim, name)
             stiffness, damping, force = (float(each().Get()) for each in (
                 drive.GetStiffnessAttr, drive.GetDampingAttr, drive.GetMaxForceAttr))
             if force < 1e30:
-                made.force_max = force * self._mass * self._length
+                made.force_max = force * effort
             if stiffness or drive.GetTypeAttr().Get() != self._physics.Tokens.force:
                 made.left_out.append(f'a drive to a position, stiffness {stiffness:.6g}')
             else:
-                made.damping = damping * self._mass
+                made.damping = damping * effort / unit
 
     def _number(self, prim: Any, keys: tuple[str, ...], unit: float, default: float = 0.0,
                 ) -> float:

@@ -12,8 +12,8 @@ system DetachableJoint fixes to the platform. Drake closes the loops by constrai
 the prefix ``drake``, as the reflected masses.
 
 SDFormat counts the positions of joints from the poses in the file, those of the home pose: the
-position of a leg's joint is its length less that at home, and its limits are counted from there,
-too.
+position of a leg's joint is its length, or its angle, less that at home, and its limits are
+counted from there, too.
 
 The model is turned so that gravity, given in base axes, points along the world's -z. What SDFormat
 has no place for stands in elements with the prefix ``stewart_dynamics``, which other readers
@@ -29,17 +29,19 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
-    COLORS, Hexapod, LegDescription, RigidBody, shapes, solids, VisualShape)
-from stewart_dynamics.description.mechanism import OF_SLIDE
+    Hexapod, LegDescription, RigidBody, shapes, solids)
 from stewart_dynamics.description.xml_text import (
     add, base_element, CARRIED, carried, inertia_texts, numbers, solid_elements, text_of)
+from stewart_dynamics.legs.mechanism import SLIDE, UNIVERSAL
+from stewart_dynamics.legs.tree import LegLink, VisualShape
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 
 _VERSION = '1.9'
 DRAKE = 'http://drake.mit.edu'
 _NAMESPACE = 'https://stewart-dynamics.example/sdf'
-_NOT_IN_SDF = ('geometry.zero_length',)
+POSITION = f'{{{_NAMESPACE}}}position'
+"""Element of a joint with its position at the poses of the file, where parameters count it."""
 _COMMENT = 'Positions of joints are counted from the home pose.'
 
 
@@ -53,20 +55,21 @@ def sdf(hexapod: Hexapod, name: str) -> str:
     add(model, 'self_collide', 'false')
     looks = shapes(hexapod)
     base = _link(model, hexapod.base_body, '', np.zeros(3), np.eye(3))
-    _shapes(base, looks[hexapod.base])
+    _shapes(base, hexapod, looks[hexapod.base])
     _joint(model, f'{hexapod.base_body}_to_world', 'fixed', 'world', hexapod.base_body)
     for leg in hexapod.legs:
         _leg(model, hexapod, leg, looks)
     platform = _link(model, hexapod.platform, hexapod.base_body, hexapod.position,
                      hexapod.rotation)
     _inertial(platform, hexapod.platform_body)
-    _shapes(platform, looks[hexapod.platform])
+    _shapes(platform, hexapod, looks[hexapod.platform])
     for leg in hexapod.legs:
         _tip(model, hexapod, leg)
     elements = {**base_element(hexapod), **solid_elements(hexapod),
                 'gravity': upright(p.gravity).T @ STANDARD_GRAVITY,
-                **{each: None for each in OF_SLIDE if p[each] is None}}
-    for each, parameter in carried(p, elements, _NOT_IN_SDF):
+                **{each: None for each in hexapod.kind.drive_limits if p[each] is None}}
+    zero = [hexapod.kind.zero] if hexapod.kind.zero else []
+    for each, parameter in carried(p, elements, zero):
         add(model, f'{CARRIED}:parameter', name=each, **parameter._asdict())
     return text_of(root, _COMMENT)
 
@@ -87,27 +90,34 @@ def upright(gravity: Array) -> Array:
 
 def _leg(model: ET.Element, hexapod: Hexapod, leg: LegDescription,
          looks: dict[str, tuple[VisualShape, ...]]) -> None:
-    cylinder = _link(model, leg.cylinder.name, hexapod.base_body, leg.base_joint, leg.mount)
-    _inertial(cylinder, hexapod.solid(leg.cylinder, leg))
-    _shapes(cylinder, looks[leg.cylinder.name])
-    universal = _joint(model, f'{leg.name}_universal', 'universal', hexapod.base_body,
-                       leg.cylinder.name)
-    for tag, along in (('axis', [1, 0, 0]), ('axis2', [0, 1, 0])):
-        add(add(universal, tag), 'xyz', numbers(along))
-    piston = _link(model, leg.piston.name, leg.cylinder.name,
-                   np.array([0.0, 0.0, leg.home_length]), np.eye(3))
-    _inertial(piston, hexapod.solid(leg.piston, leg))
-    _shapes(piston, looks[leg.piston.name])
-    slide = _joint(model, leg.name, 'prismatic', leg.cylinder.name, leg.piston.name)
-    add(slide, 'drake:rotor_inertia', numbers(leg.reflected_mass))
-    add(slide, 'drake:gear_ratio', numbers(1.0))
-    axis = add(slide, 'axis')
+    for link, body in leg.links:
+        parent = leg.carrier(link, hexapod.base_body)
+        made = _link(model, body.name, parent, *link.at_home[::-1])
+        _inertial(made, hexapod.solid(link, body))
+        _shapes(made, hexapod, looks[body.name])
+        if link.joint == UNIVERSAL:
+            universal = _joint(model, f'{leg.name}_universal', 'universal', parent, body.name)
+            for tag, along in (('axis', [1, 0, 0]), ('axis2', [0, 1, 0])):
+                add(add(universal, tag), 'xyz', numbers(along))
+        else:
+            _drive(model, hexapod, leg, link, parent)
+
+
+def _drive(model: ET.Element, hexapod: Hexapod, leg: LegDescription, link: LegLink, parent: str,
+           ) -> None:
+    drive = _joint(model, leg.name, 'prismatic' if link.joint == SLIDE else 'revolute', parent,
+                   f'{leg.name}_{link.part}')
+    add(drive, 'drake:rotor_inertia', numbers(leg.reflected))
+    add(drive, 'drake:gear_ratio', numbers(1.0))
+    if not hexapod.kind.zero:
+        add(drive, f'{CARRIED}:position', numbers(leg.branch.home))
+    axis = add(drive, 'axis')
     add(axis, 'xyz', numbers([0, 0, 1]))
     limits, limit = leg.limits, add(axis, 'limit')
-    for tag, value in (('lower', limits.length_min), ('upper', limits.length_max)):
+    for tag, value in (('lower', limits.lowest), ('upper', limits.highest)):
         if value is not None:
-            add(limit, tag, numbers(value - leg.home_length))
-    for tag, value in (('effort', limits.force_max), ('velocity', limits.velocity_max)):
+            add(limit, tag, numbers(value - leg.branch.home))
+    for tag, value in (('effort', limits.effort), ('velocity', limits.rate)):
         if value is not None:
             add(limit, tag, numbers(value))
     dynamics = add(axis, 'dynamics')
@@ -119,15 +129,15 @@ def _tip(model: ET.Element, hexapod: Hexapod, leg: LegDescription) -> None:
     """Write a ball joint, the tip that it leads to, and the plugin that fixes the tip."""
     tip = _link(model, leg.tip, hexapod.platform, leg.platform_joint, np.eye(3))
     _inertial(tip, hexapod.frame_body(leg.tip))
-    _joint(model, leg.ball, 'ball', leg.piston.name, leg.tip)
+    _joint(model, leg.ball, 'ball', leg.last.name, leg.tip)
     fixes = add(model, 'plugin', filename='gz-sim-detachable-joint-system',
                 name='gz::sim::systems::DetachableJoint')
     add(fixes, 'parent_link', hexapod.platform)
     add(fixes, 'child_model', '__model__')
     add(fixes, 'child_link', leg.tip)
     closing = add(model, 'drake:ball_constraint')
-    for key, value in (('body_A', leg.piston.name), ('body_B', hexapod.platform),
-                       ('p_AP', numbers(np.zeros(3))), ('p_BQ', numbers(leg.platform_joint))):
+    for key, value in (('body_A', leg.last.name), ('body_B', hexapod.platform),
+                       ('p_AP', numbers(leg.branch.end)), ('p_BQ', numbers(leg.platform_joint))):
         add(closing, f'drake:ball_constraint_{key}', value)
 
 
@@ -160,7 +170,7 @@ def _inertial(link: ET.Element, body: RigidBody) -> None:
         add(inertia, tag, text)
 
 
-def _shapes(link: ET.Element, looks: Sequence[VisualShape]) -> None:
+def _shapes(link: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) -> None:
     for kind, some in (('visual', looks), ('collision', solids(looks))):
         for n, shape in enumerate(some, 1):
             one = add(link, kind, name=f'{kind}_{n}')
@@ -168,8 +178,8 @@ def _shapes(link: ET.Element, looks: Sequence[VisualShape]) -> None:
             _geometry(one, shape)
             if kind == 'visual':
                 material = add(one, 'material')
-                add(material, 'ambient', numbers(COLORS[shape.color]))
-                add(material, 'diffuse', numbers(COLORS[shape.color]))
+                add(material, 'ambient', numbers(hexapod.colors[shape.color]))
+                add(material, 'diffuse', numbers(hexapod.colors[shape.color]))
 
 
 def _geometry(parent: ET.Element, shape: VisualShape) -> None:

@@ -6,58 +6,28 @@
 Base, platform and legs of a mechanism, found by how its bodies are connected.
 
 Base and platform are the two groups of bodies that at least six joints are at; between them there
-are six chains with one slide each. Names are not used, but for the block of stewart_describe.
+are six chains, in which a kind of legs finds its drives. Names are not used, but for the block of
+stewart_describe.
 """
 
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.mechanism import (
-    BALL, DescriptionError, FIXED, Joint, Mechanism, MechanismBody, SLIDE, WORLD)
+from stewart_dynamics.legs import KINDS
+from stewart_dynamics.legs.kind import LegKind
+from stewart_dynamics.legs.mechanism import (
+    BALL, Chain, DescriptionError, FIXED, HINGE, Joint, LegJoint, Mechanism, MechanismBody, SLIDE,
+    WORLD)
 
 LEGS = 6
+_JOINTS_OF_ROD = 2  # from the base to the end of a rod without one on the platform, at least
 _ALIKE = 0.1  # masses of equal dummies, as CAD programs compute them, differ by less
-
-
-class LegJoint(NamedTuple):
-    """A joint of a leg, on the way from the base to the platform."""
-
-    joint: Joint
-    from_parent: bool  # whether its parent is the body on the side of the base
-
-    @property
-    def near(self) -> Array:
-        """Return its point on the side of the base [m]."""
-        return self._point(self.from_parent)
-
-    @property
-    def far(self) -> Array:
-        """Return its point on the side of the platform [m]."""
-        return self._point(not self.from_parent)
-
-    def _point(self, on_parent: bool) -> Array:
-        on_child = self.joint.child_anchor
-        return self.joint.anchor if on_parent or on_child is None else on_child
-
-
-class Chain(NamedTuple):
-    """A leg as found."""
-
-    steps: list[LegJoint]
-    lower: list[MechanismBody]  # the bodies on the side of the base of its slide
-    upper: list[MechanismBody]
-
-    @property
-    def slide(self) -> int:
-        """Return which step is its slide."""
-        return next(n for n, step in enumerate(self.steps) if step.joint.kind == SLIDE)
 
 
 class Topology(NamedTuple):
@@ -66,8 +36,9 @@ class Topology(NamedTuple):
     base: MechanismBody  # whose frame is the base frame
     platform: MechanismBody
     platform_parts: list[MechanismBody]
-    """All bodies that are fixed to the platform, itself included."""
+    """All bodies that are fixed to the platform, or carried by it alone, itself included."""
     chains: list[Chain]
+    kind: LegKind
 
 
 class _Groups:
@@ -161,11 +132,12 @@ class _Groups:
             self.joints[group] = [joint for joint in self.joints[group]
                                   if self.other(joint, group) not in (one, other)]
 
-    def reached(self, start: str, without: Iterable[str] = (), slides: bool = True,
+    def reached(self, start: str, without: Iterable[str] = (), closed: Joint | None = None,
                 ) -> dict[str, tuple[str, Joint] | None]:
         """
         Return the groups that are connected to one while others are taken away, nearest first.
 
+        closed: a joint that is taken away as well.
         Each has the group and the joint that lead to it, None for the first.
         """
         found: dict[str, tuple[str, Joint] | None] = {start: None}
@@ -174,8 +146,7 @@ class _Groups:
             group = waiting.popleft()
             for joint in self.joints[group]:
                 other = self.other(joint, group)
-                if other not in found and other not in without and (
-                        slides or joint.kind != SLIDE):
+                if other not in found and other not in without and joint is not closed:
                     found[other] = group, joint
                     waiting.append(other)
         return found
@@ -183,22 +154,22 @@ class _Groups:
 
 def topology_of(mechanism: Mechanism) -> Topology:
     """Return the hexapod of a mechanism; DescriptionError says what there is instead."""
-    slides = [joint for joint in mechanism.joints if joint.kind == SLIDE]
     groups = _Groups(mechanism)
     hubs = groups.hubs()
     if len(hubs) == 1 and _close(mechanism, groups, hubs[0]):
         groups = _Groups(mechanism)
         hubs = groups.hubs()
-    if len(slides) < LEGS or len(hubs) < 2:
-        hint = _open_ends(groups) if len(slides) >= LEGS else '' if slides else (
-            '. Cranks with rods (rotary hexapods) are not read')
+    slides, hinges = (sum(joint.kind == kind for joint in mechanism.joints)
+                      for kind in (SLIDE, HINGE))
+    if slides < LEGS and hinges < LEGS or len(hubs) < 2:
         raise DescriptionError(
-            f'{mechanism.source}: no hexapod: {len(slides)} prismatic joints, and {len(hubs)} '
-            'bodies at which six legs end; six prismatic joints are needed between two bodies, '
-            f'and joints or constraints that close the loops{hint}')
+            f'{mechanism.source}: no hexapod: {slides} prismatic joints, and {len(hubs)} '
+            'bodies at which six legs end; six prismatic joints are needed between two bodies, or '
+            'six revolute ones with rods, and joints or constraints that close the loops'
+            f'{_open_ends(groups) if max(slides, hinges) >= LEGS else ""}')
     base, platform = sorted(hubs, key=lambda group: _baseness(groups, group))[:2]
     groups.separate(base, platform)
-    chains: dict[str, Chain] = {}
+    found: dict[LegKind, dict[str, Chain]] = {kind: {} for kind in KINDS}
     seen: set[str] = set()
     for joint in groups.joints[base]:
         start = groups.other(joint, base)
@@ -206,19 +177,42 @@ def topology_of(mechanism: Mechanism) -> Topology:
             continue
         inside = groups.reached(start, (base, platform))
         seen.update(inside)
-        chain = _chain(groups, base, platform, inside)
-        if chain is not None:
-            chains[chain.steps[chain.slide].joint.name] = chain
+        path, steps = _path(groups, base, platform, inside)
+        for kind in KINDS if steps else ():
+            drive = kind.drive_of(steps)
+            if drive is not None:
+                chain = _chain(groups, (base, platform), inside, path, steps, kind, drive)
+                found[kind][chain.driven.joint.name] = chain
+    kind = max(KINDS, key=lambda each: len(found[each]))
+    chains = found[kind]
     if len(chains) != LEGS:
         raise DescriptionError(
-            f'{mechanism.source}: no hexapod: legs with one prismatic joint each between '
-            f'{groups.shown(base)} and {groups.shown(platform)}: {len(chains)}; there must be '
-            f'six{_open_ends(groups)}')
+            f'{mechanism.source}: no hexapod: legs with one prismatic joint each, or with one '
+            f'revolute joint and a rod, between {groups.shown(base)} and '
+            f'{groups.shown(platform)}: {len(chains)}; there must be six{_open_ends(groups)}')
     order = [name for name in mechanism.order if name in chains]
     names = order if len(order) == LEGS else [
-        joint.name for joint in slides if joint.name in chains]
-    return Topology(groups.main(base), groups.main(platform), groups.parts(platform),
-                    [chains[name] for name in names])
+        joint.name for joint in mechanism.joints if joint.name in chains]
+    carried = _carried_by(groups, base, platform, seen)
+    mechanism.remarks += [
+        f'{part.name}: moves against the platform in the file: taken as fixed to it where it is'
+        for part in carried if part.mass]
+    return Topology(groups.main(base), groups.main(platform), groups.parts(platform) + carried,
+                    [chains[name] for name in names], kind)
+
+
+def _carried_by(groups: _Groups, base: str, platform: str, of_legs: Collection[str],
+                ) -> list[MechanismBody]:
+    """Return the bodies that are connected to the platform alone, by joints that move."""
+    found: dict[str, None] = {}
+    for joint in groups.joints[platform]:
+        start = groups.other(joint, platform)
+        if start in of_legs or start in found:
+            continue
+        others = groups.reached(start, (platform,))
+        if base not in others:
+            found |= dict.fromkeys(others)
+    return [part for group in found for part in groups.parts(group)]
 
 
 def _open_ends(groups: _Groups) -> str:
@@ -247,7 +241,8 @@ def _close(mechanism: Mechanism, groups: _Groups, base: str) -> bool:
             distances[group] = distances[before[0]] + 1 if before else 1
         seen.update(distances)
         slides = sum(each.kind == SLIDE for group in distances for each in groups.joints[group])
-        if slides == 2:  # seen from both of its bodies
+        turns = not slides and joint.kind == HINGE and max(distances.values()) >= _JOINTS_OF_ROD
+        if slides == 2 or turns:  # a slide is seen from both of its bodies
             last = max(distances, key=lambda group: distances[group])
             lengths[last] = distances[last]
     # A leg that ends at its slide has no joint at the platform.
@@ -303,21 +298,27 @@ def _baseness(groups: _Groups, group: str) -> tuple[bool, bool, float]:
     return WORLD not in groups.members[group], carried, float(np.mean(heights))
 
 
-def _chain(groups: _Groups, base: str, platform: str, inside: Iterable[str]) -> Chain | None:
-    """Return the leg that leads through these groups; None if it is not one."""
+def _path(groups: _Groups, base: str, platform: str, inside: Iterable[str],
+          ) -> tuple[list[str], list[LegJoint]]:
+    """Return groups and joints that lead through groups to the platform; none if none do."""
     others = set(groups.members) - {*inside, platform}
     before = groups.reached(base, others)
     if platform not in before:
-        return None
+        return [], []
     steps: list[LegJoint] = []
     path, group = [platform], platform
     while (step := before[group]) is not None:
         group, joint = step
         steps.insert(0, LegJoint(joint, groups.of(joint.parent) == group))
         path.insert(0, group)
-    at = [n for n, each in enumerate(steps) if each.joint.kind == SLIDE]
-    if len(at) != 1:
-        return None
-    lower = groups.reached(path[at[0]], (base, platform), slides=False)
-    return Chain(steps, *([part for group in inside if (group in lower) == is_lower
-                           for part in groups.parts(group)] for is_lower in (True, False)))
+    return path, steps
+
+
+def _chain(groups: _Groups, ends: tuple[str, str], inside: Iterable[str], path: Sequence[str],
+           steps: list[LegJoint], kind: LegKind, drive: int) -> Chain:
+    """Return a leg with its bodies on both sides of the joint between its parts."""
+    at = kind.parting(steps)
+    reached = groups.reached(path[at], ends, steps[at].joint)
+    lower, upper = ([part for group in inside if (group in reached) == is_lower
+                     for part in groups.parts(group)] for is_lower in (True, False))
+    return Chain(steps, drive, lower, upper, kind.places(steps))

@@ -23,17 +23,16 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
-    COLORS, Hexapod, LegDescription, massless, PASSIVE_RATE, RigidBody, shapes, solids, UNLIMITED,
-    VisualShape)
+    Hexapod, LegDescription, massless, PASSIVE_RATE, RigidBody, shapes, solids, UNLIMITED)
 from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, inertia_texts, length_elements, numbers,
+    add, CARRIED, carried, center_elements, inertia_texts, numbers, position_elements,
     solid_elements, text_of)
+from stewart_dynamics.legs.mechanism import Placement, SLIDE, UNIVERSAL
+from stewart_dynamics.legs.tree import VisualShape
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.kinematics.leg_joints import PLATFORM_JOINTS
 from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 
-_NOT_IN_URDF = ('actuator.reflected_mass',)
-_UNLIMITED = dict.fromkeys(('limits.velocity_max', 'limits.force_max'), [UNLIMITED] * 6)
 _AXES = {'x': (1.0, 0.0, 0.0), 'y': (0.0, 1.0, 0.0), 'z': (0.0, 0.0, 1.0)}
 # Axes of the platform's virtual joints, and the largest angles of their closed form.
 _VIRTUAL = {'yaw': ('z', math.pi), 'pitch': ('y', math.pi / 2), 'roll': ('x', math.pi)}
@@ -65,7 +64,7 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None,
     solid: all links that move have a mass, and inertia about all axes.
     """
     root = ET.Element('robot')
-    for color, rgba in COLORS.items():
+    for color, rgba in hexapod.colors.items():
         add(add(root, 'material', name=color), 'color', rgba=numbers(rgba))
     looks = shapes(hexapod)
     _link(root, massless(hexapod.base), looks[hexapod.base])
@@ -78,21 +77,18 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None,
     root.set('name', f'{name}_hexapod' if name in links else name)
     p = hexapod.parameters
     block = add(root, CARRIED)
-    elements = {'gravity': STANDARD_GRAVITY, **length_elements(hexapod), **{
-        each: values for each, values in _UNLIMITED.items() if p[each] is None}}
-    if solid:
-        elements |= solid_elements(hexapod)
-    else:
-        elements |= {f'legs.{part}.center_of_mass': np.where(
-            of_part.mass > 0.0, of_part.center_of_mass, 0.0)  # no mass has no center
-            for part, of_part in p.legs.parts.items() if not of_part.mass.all()}
-    for each, parameter in carried(p, elements, _NOT_IN_URDF):
+    kind = hexapod.kind
+    elements = {'gravity': STANDARD_GRAVITY, **position_elements(hexapod), **{
+        each: [UNLIMITED] * 6 for each in (kind.rate_limit, kind.effort_limit)
+        if p[each] is None}}
+    elements |= solid_elements(hexapod) if solid else center_elements(hexapod)
+    for each, parameter in carried(p, elements, (kind.fields['reflected_mass'],)):
         add(block, 'parameter', name=each, **parameter._asdict())
     for leg in hexapod.legs:
         if constraints:
             _constraint(root, hexapod, leg)
         else:
-            add(block, 'loop', tip=leg.piston.name, platform=leg.ball)
+            add(block, 'loop', tip=leg.end_frame, platform=leg.ball)
     if control is not None:
         _ros2_control(root, hexapod, name, control)
     return text_of(root, _COMMENT)
@@ -109,7 +105,7 @@ def _platform(root: ET.Element, hexapod: Hexapod, frame: Callable[[str], RigidBo
     reach = sum(np.linalg.norm(joints, axis=1).max() for joints in (
         hexapod.parameters.geometry.base_joints,
         hexapod.parameters.geometry.platform_joints))
-    reach += max(leg.limits.lengths(leg.home_length)[1] for leg in hexapod.legs)
+    reach += max(leg.branch.reach for leg in hexapod.legs)
     for each, name in zip(PLATFORM_JOINTS, hexapod.joints, strict=False):
         axis, bound = _VIRTUAL.get(each, (each, reach))
         child = hexapod.platform if each == PLATFORM_JOINTS[-1] else f'{name}_link'
@@ -130,29 +126,46 @@ def _platform(root: ET.Element, hexapod: Hexapod, frame: Callable[[str], RigidBo
 def _leg(root: ET.Element, hexapod: Hexapod, leg: LegDescription,
          frame: Callable[[str], RigidBody], solid: bool,
          looks: dict[str, tuple[VisualShape, ...]]) -> None:
-    _link(root, frame(leg.cross))
-    for body in (leg.cylinder, leg.piston):
-        _link(root, hexapod.solid(body, leg) if solid else body, looks[body.name])
-    first = _joint(root, leg.universal[0], 'revolute', hexapod.base, leg.cross, leg.base_joint,
-                   leg.mount)
+    for link, body in leg.links:
+        if link.joint == UNIVERSAL:
+            _link(root, frame(leg.cross))
+        _link(root, hexapod.solid(link, body) if solid else body, looks[body.name])
+    for link, body in leg.links:
+        parent = leg.carrier(link, hexapod.base)
+        if link.joint == UNIVERSAL:
+            _universal(root, leg, parent, body.name, link.at_zero)
+        else:
+            _drive(root, leg, parent, body.name, link.at_zero)
+    if leg.branch.end.any():
+        _link(root, massless(leg.tip))
+        _joint(root, f'{leg.tip}_fixed', 'fixed', leg.last.name, leg.tip, leg.branch.end)
+
+
+def _universal(root: ET.Element, leg: LegDescription, parent: str, child: str, at: Placement,
+               ) -> None:
+    first = _joint(root, leg.universal[0], 'revolute', parent, leg.cross, at.position,
+                   at.rotation)
     add(first, 'axis', xyz=numbers(_AXES['x']))
     _limit(first, (-math.pi, math.pi), PASSIVE_RATE, 0.0)
-    second = _joint(root, leg.universal[1], 'revolute', leg.cross, leg.cylinder.name)
+    second = _joint(root, leg.universal[1], 'revolute', leg.cross, child)
     add(second, 'axis', xyz=numbers(_AXES['y']))
     _limit(second, (-math.pi / 2, math.pi / 2), PASSIVE_RATE, 0.0)
-    piston = _joint(root, leg.name, 'prismatic', leg.cylinder.name, leg.piston.name,
-                    np.array([0.0, 0.0, leg.zero_length]))
-    add(piston, 'axis', xyz=numbers(_AXES['z']))
-    shortest, longest = leg.limits.lengths(leg.home_length)
-    _limit(piston, (shortest - leg.zero_length, longest - leg.zero_length),
-           leg.limits.velocity_max or UNLIMITED, leg.limits.force_max or UNLIMITED)
-    add(piston, 'dynamics', damping=numbers(leg.viscous_friction),
+
+
+def _drive(root: ET.Element, leg: LegDescription, parent: str, child: str, at: Placement) -> None:
+    kind = 'prismatic' if leg.drive.joint == SLIDE else 'revolute'
+    drive = _joint(root, leg.name, kind, parent, child, at.position, at.rotation)
+    add(drive, 'axis', xyz=numbers(_AXES['z']))
+    lowest, highest = leg.bounds()
+    _limit(drive, (lowest - leg.branch.zero, highest - leg.branch.zero),
+           leg.limits.rate or UNLIMITED, leg.limits.effort or UNLIMITED)
+    add(drive, 'dynamics', damping=numbers(leg.viscous_friction),
         friction=numbers(leg.coulomb_friction))
 
 
 def _constraint(root: ET.Element, hexapod: Hexapod, leg: LegDescription) -> None:
     closing = add(root, 'constraint', name=leg.ball, type='spherical')
-    for side, link, at in (('parent', leg.piston.name, np.zeros(3)),
+    for side, link, at in (('parent', leg.last.name, leg.branch.end),
                            ('child', hexapod.platform, leg.platform_joint)):
         add(closing, side, link=link)
         add(closing, f'{side}_origin', xyz=numbers(at), rpy=numbers(np.zeros(3)))
@@ -223,5 +236,5 @@ def _ros2_control(root: ET.Element, hexapod: Hexapod, name: str, control: Ros2Co
         for interface in ('position', 'velocity', 'effort'):
             state = add(joint, 'state_interface', name=interface)
             if interface == 'position':
-                add(state, 'param', numbers(leg.home_length - leg.zero_length),
+                add(state, 'param', numbers(leg.at_home),
                     name='initial_value')

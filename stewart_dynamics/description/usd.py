@@ -10,6 +10,8 @@ five have ``excludeFromArticulation``, so that they close the loops. Solvers of 
 ignore the flag. ``body0`` of each joint is the parent in the tree. Positions of the legs' joints
 are counted from the home pose.
 
+Angles are in degrees, and the damping of a drive that turns is by rates in degrees per second.
+
 Coulomb friction, reflected mass and the limit of the rate have no attribute in UsdPhysics, but in
 the schemas of Newton and PhysX. ``physxJoint:jointFriction``, a number without unit, is not
 written. Attributes are single-precision: attributes ``stewart_dynamics:...`` of the model have the
@@ -18,6 +20,7 @@ parameters in full.
 
 from __future__ import annotations
 
+import math
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -25,38 +28,50 @@ import numpy as np
 from stewart_dynamics import __version__
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
-    COLORS, Hexapod, LegDescription, massless, RigidBody, shapes, VisualShape)
-from stewart_dynamics.description.mechanism import OF_SLIDE
+    Color, Hexapod, LegDescription, massless, RigidBody, shapes)
 from stewart_dynamics.description.mjcf import SOLIMP, SOLREF_LOOP
 from stewart_dynamics.description.xml_text import CARRIED, carried, solid_elements
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.legs.mechanism import Placement, SLIDE, UNIVERSAL
+from stewart_dynamics.legs.tree import VisualShape
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
 
 if TYPE_CHECKING:
     from pxr import Usd
 
 _FREE = 179.0  # degrees; PhysX takes less than half a turn
 _LOCKED = 1.0, -1.0  # a lower limit above the upper one locks an axis
-# Attributes of a leg's joint, those of Newton and of PhysX, and the schemas that they belong to.
-ARMATURE = 'newton:armature', 'physxJointAxis:linear:armature', 'physxJoint:armature'
-COULOMB_FRICTION = ('newton:friction', 'physxJointAxis:linear:staticFrictionEffort',
-                    'physxJointAxis:linear:dynamicFrictionEffort')
-RATE_LIMIT = ('newton:velocityLimit', 'physxJointAxis:linear:maxJointVelocity',
-              'physxJoint:maxJointVelocity')
+LINEAR, ANGULAR = 'linear', 'angular'  # drives
+
+
+def armature(axis: str) -> tuple[str, ...]:
+    """Return attributes of a joint with its armature, of Newton and PhysX."""
+    return 'newton:armature', f'physxJointAxis:{axis}:armature', 'physxJoint:armature'
+
+
+def coulomb_friction(axis: str) -> tuple[str, ...]:
+    """Return attributes of a joint with its Coulomb friction."""
+    return ('newton:friction', f'physxJointAxis:{axis}:staticFrictionEffort',
+            f'physxJointAxis:{axis}:dynamicFrictionEffort')
+
+
+def rate_limit(axis: str) -> tuple[str, ...]:
+    """Return attributes of a joint with the limit of its rate."""
+    return ('newton:velocityLimit', f'physxJointAxis:{axis}:maxJointVelocity',
+            'physxJoint:maxJointVelocity')
+
+
 # MuJoCo's defaults; its schema needs all five numbers.
 _MIDPOINT_POWER = 0.5, 2.0
 _EQUALITY = 'MjcEqualityConnectAPI'
-_SCHEMAS = 'NewtonJointAPI', 'PhysxJointAPI', 'PhysxJointAxisAPI:linear'
+_SCHEMAS = 'NewtonJointAPI', 'PhysxJointAPI'  # and PhysxJointAxisAPI of the axis
 # Attributes of the model with a parameter, and with the value that its own attributes have.
 VALUE, ELEMENT = f'{CARRIED}:value', f'{CARRIED}:element'
+POSITION = f'{CARRIED}:position'
+"""Attribute of a joint with its position at the poses of the file, where parameters count it."""
 _EXACT = (
     'gravity', 'geometry.base_joints', 'geometry.platform_joints', 'platform.mass',
-    'platform.center_of_mass', 'platform.inertia', 'actuator.reflected_mass',
-    'actuator.viscous_friction', 'actuator.coulomb_friction',
-    *(f'legs.{part}.{each}' for part in ('cylinder', 'piston')
-      for each in ('mass', 'center_of_mass', 'inertia')))
-_NOT_IN_USD = ('geometry.zero_length',)
+    'platform.center_of_mass', 'platform.inertia')
 
 
 def usd(hexapod: Hexapod, name: str) -> str:
@@ -83,7 +98,7 @@ def usd(hexapod: Hexapod, name: str) -> str:
     size = float(np.linalg.norm(gravity))
     scene.CreateGravityMagnitudeAttr(size)
     scene.CreateGravityDirectionAttr(Gf.Vec3f(*(gravity / size if size else (0.0, 0.0, -1.0))))
-    writer = _Writer(stage, str(root.GetPath()))
+    writer = _Writer(stage, str(root.GetPath()), hexapod.colors)
     looks = shapes(hexapod, uris=False)
     writer.body(massless(hexapod.base_body), np.zeros(3), np.eye(3), looks[hexapod.base])
     writer.joint('Fixed', f'{hexapod.base_body}_to_world', None, hexapod.base_body, np.zeros(3),
@@ -92,7 +107,8 @@ def usd(hexapod: Hexapod, name: str) -> str:
                 looks[hexapod.platform])
     for n, leg in enumerate(hexapod.legs):
         _leg(writer, hexapod, leg, looks, excluded=n > 0)
-    for name, parameter in carried(hexapod.parameters, _elements(hexapod), _NOT_IN_USD):
+    zero = [hexapod.kind.zero] if hexapod.kind.zero else []
+    for name, parameter in carried(hexapod.parameters, _elements(hexapod), zero):
         for prefix, value in ((VALUE, parameter.value), (ELEMENT, parameter.element)):
             if value:
                 root.GetPrim().CreateAttribute(
@@ -109,37 +125,43 @@ def attribute_name(prefix: str, name: str) -> str:
 def _elements(hexapod: Hexapod) -> dict[str, Any]:
     """Return the values of the attributes of the formats, before they are single-precision."""
     p = hexapod.parameters
-    found: dict[str, Any] = {name: p[name] for name in _EXACT} | solid_elements(hexapod)
+    kind = hexapod.kind
+    found: dict[str, Any] = {
+        name: kind.expanded(p, name) for name in (*_EXACT, *kind.elements)} | solid_elements(
+            hexapod)
     frames = {'base_frame': hexapod.base_body, 'platform_frame': hexapod.platform}
     found |= {name: _prim(frame) for name, frame in frames.items() if _prim(frame) != p[name]}
-    homes = np.array([leg.home_length for leg in hexapod.legs])
+    # Readers add the position of a joint that is written, and count from home where it is not.
+    homes = np.array([leg.branch.home if kind.zero else 0.0 for leg in hexapod.legs])
     found |= {name: None if p[name] is None else p[name] - (
-        homes if name in (LENGTH_MIN, LENGTH_MAX) else 0.0) for name in OF_SLIDE}
+        homes if name in kind.position_limits else 0.0) for name in kind.drive_limits}
     return found
 
 
 def _leg(writer: _Writer, hexapod: Hexapod, leg: LegDescription,
          looks: dict[str, tuple[VisualShape, ...]], excluded: bool) -> None:
-    tip = leg.base_joint + leg.home_length * leg.mount[:, 2]
-    writer.body(hexapod.solid(leg.cylinder, leg), leg.base_joint, leg.mount,
-                looks[leg.cylinder.name])
-    writer.body(hexapod.solid(leg.piston, leg), tip, leg.mount, looks[leg.piston.name])
-    universal = writer.joint('', f'{leg.name}_universal', hexapod.base_body, leg.cylinder.name,
-                             leg.base_joint, leg.mount, np.zeros(3))
-    for axis in ('transX', 'transY', 'transZ', 'rotZ'):
-        writer.limit(universal, axis, *_LOCKED)
-    for axis in ('rotX', 'rotY'):  # free in UsdPhysics, but locked in Newton without limits
-        writer.limit(universal, axis, -_FREE, _FREE)
-    slide = writer.joint('Prismatic', leg.name, leg.cylinder.name, leg.piston.name,
-                         np.array([0.0, 0.0, leg.home_length]), np.eye(3), np.zeros(3))
-    slide.CreateAxisAttr('Z')
-    if leg.limits.length_min is not None:
-        slide.CreateLowerLimitAttr(leg.limits.length_min - leg.home_length)
-    if leg.limits.length_max is not None:
-        slide.CreateUpperLimitAttr(leg.limits.length_max - leg.home_length)
-    writer.actuator(slide, leg)
-    ball = writer.joint('Spherical', leg.ball, leg.piston.name, hexapod.platform, np.zeros(3),
-                        leg.mount.T @ hexapod.rotation, leg.platform_joint)
+    at = Placement(np.eye(3), np.zeros(3))
+    for link, body in leg.links:
+        at = at.of(link.at_home)
+        writer.body(hexapod.solid(link, body), at.position, at.rotation, looks[body.name])
+    for link, body in leg.links:
+        parent = leg.carrier(link, hexapod.base_body)
+        if link.joint == UNIVERSAL:
+            universal = writer.joint('', f'{leg.name}_universal', parent, body.name,
+                                     link.at_home.position, link.at_home.rotation, np.zeros(3))
+            for axis in ('transX', 'transY', 'transZ', 'rotZ'):
+                writer.limit(universal, axis, *_LOCKED)
+            # Free in UsdPhysics, but locked in Newton without limits.
+            for axis in ('rotX', 'rotY'):
+                writer.limit(universal, axis, -_FREE, _FREE)
+        else:
+            slides = link.joint == SLIDE
+            drive = writer.joint('Prismatic' if slides else 'Revolute', leg.name, parent,
+                                 body.name, link.at_home.position, link.at_home.rotation,
+                                 np.zeros(3))
+            writer.drive(drive, leg, LINEAR if slides else ANGULAR, not hexapod.kind.zero)
+    ball = writer.joint('Spherical', leg.ball, leg.last.name, hexapod.platform, leg.branch.end,
+                        at.rotation.T @ hexapod.rotation, leg.platform_joint)
     ball.CreateExcludeFromArticulationAttr(excluded)
     if excluded:
         writer.stiff(ball)
@@ -155,10 +177,10 @@ def _prim(name: str) -> str:
 class _Writer:
     """Writes bodies and joints below a root prim."""
 
-    def __init__(self, stage: Usd.Stage, root: str) -> None:
+    def __init__(self, stage: Usd.Stage, root: str, colors: dict[str, Color]) -> None:
         from pxr import Gf, UsdGeom, UsdPhysics
 
-        self._stage, self._root = stage, root
+        self._stage, self._root, self._colors = stage, root, colors
         self._gf, self._geom, self._physics = Gf, UsdGeom, UsdPhysics
 
     def body(self, body: RigidBody, position: Array, rotation: Array,
@@ -203,25 +225,39 @@ class _Writer:
         limit.CreateLowAttr(low)
         limit.CreateHighAttr(high)
 
-    def actuator(self, slide: Any, leg: LegDescription) -> None:
-        """Add the actuator of a leg: a force, its limit, friction and reflected mass."""
+    def drive(self, joint: Any, leg: LegDescription, axis: str, positions: bool) -> None:
+        """
+        Add limits and actuator of a leg: an effort, its limit, friction and reflected mass.
+
+        axis: LINEAR or ANGULAR. positions: write the position of the joint.
+        """
         from pxr import Sdf
 
-        drive = self._physics.DriveAPI.Apply(slide.GetPrim(), 'linear')
+        unit = math.degrees(1.0) if axis == ANGULAR else 1.0
+        joint.CreateAxisAttr('Z')
+        for create, value in ((joint.CreateLowerLimitAttr, leg.limits.lowest),
+                              (joint.CreateUpperLimitAttr, leg.limits.highest)):
+            if value is not None:
+                create((value - leg.branch.home) * unit)
+        drive = self._physics.DriveAPI.Apply(joint.GetPrim(), axis)
         drive.CreateTypeAttr('force')
         drive.CreateStiffnessAttr(0.0)
-        drive.CreateDampingAttr(leg.viscous_friction)
-        if leg.limits.force_max is not None:
-            drive.CreateMaxForceAttr(leg.limits.force_max)
-        for schema in _SCHEMAS:
-            slide.GetPrim().AddAppliedSchema(schema)
-        for keys, value in ((ARMATURE, leg.reflected_mass),
-                            (COULOMB_FRICTION, leg.coulomb_friction),
-                            (RATE_LIMIT, leg.limits.velocity_max)):
+        drive.CreateDampingAttr(leg.viscous_friction / unit)
+        if leg.limits.effort is not None:
+            drive.CreateMaxForceAttr(leg.limits.effort)
+        for schema in (*_SCHEMAS, f'PhysxJointAxisAPI:{axis}'):
+            joint.GetPrim().AddAppliedSchema(schema)
+        rate = None if leg.limits.rate is None else leg.limits.rate * unit
+        for keys, value in ((armature(axis), leg.reflected),
+                            (coulomb_friction(axis), leg.coulomb_friction),
+                            (rate_limit(axis), rate)):
             for key in keys:
                 if value is not None:
-                    slide.GetPrim().CreateAttribute(
+                    joint.GetPrim().CreateAttribute(
                         key, Sdf.ValueTypeNames.Float, custom=False).Set(value)
+        if positions:
+            joint.GetPrim().CreateAttribute(POSITION, Sdf.ValueTypeNames.Double).Set(
+                leg.branch.home)
 
     def stiff(self, ball: Any) -> None:
         """Make a joint that closes a loop as stiff in MuJoCo and Newton as it is in the MJCF."""
@@ -252,7 +288,7 @@ class _Writer:
         if shape.kind == 'cylinder':
             drawn.CreateHeightAttr(shape.length)
             drawn.CreateAxisAttr('Z')
-        drawn.CreateDisplayColorAttr([self._gf.Vec3f(*COLORS[shape.color][:3])])
+        drawn.CreateDisplayColorAttr([self._gf.Vec3f(*self._colors[shape.color][:3])])
 
     def _quaternion(self, rotation: Array, kind: Any) -> Any:
         x, y, z, w = to_quaternion(rotation)

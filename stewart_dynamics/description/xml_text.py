@@ -14,21 +14,16 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.description.hexapod import Hexapod, RigidBody
-from stewart_dynamics.description.mechanism import CarriedParameter, OF_SLIDE
-from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
+from stewart_dynamics.legs.mechanism import CarriedParameter
 from stewart_dynamics.parameters.circles import CIRCLE_NAMES
 from stewart_dynamics.parameters.table import INERTIA, Parameters
 
 CARRIED = 'stewart_dynamics'
 """Name of the block, or prefix of the elements, of parameters without an own element."""
 ELEMENT = f'{CARRIED}.element'  # prefix in MJCF, which has texts with names alone
+# Parameters of all kinds that formats have elements for.
+_IN_ELEMENTS = frozenset((*CIRCLE_NAMES, 'geometry.base_joints', 'geometry.platform_joints'))
 _GROUPS = ('actuator.', 'drive.', 'geometry.', 'legs.', 'limits.')
-# Parameters of these groups that formats have elements for.
-_IN_ELEMENTS = frozenset((
-    *OF_SLIDE, *(f'legs.{part}.{each}' for part in ('cylinder', 'piston')
-                 for each in ('mass', 'center_of_mass', 'inertia')),
-    *CIRCLE_NAMES, 'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
-    'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'))
 NOT_SET = 'none'  # value there of a limit that is not set, or of an element that is missing
 
 
@@ -68,11 +63,13 @@ def carried(parameters: Parameters, elements: Mapping[str, Any], without: Iterab
     without: names of parameters that the format has no elements for. The given ones that no format
     has elements for are added to them.
     """
+    kind = parameters.leg_kind
+    in_elements = {*_IN_ELEMENTS, *kind.elements, *kind.shortened, kind.zero, *kind.drive_limits}
     for name, element in elements.items():
-        yield name, CarriedParameter(_text(parameters[name]), _text(element))
+        yield name, CarriedParameter(_text(kind.expanded(parameters, name)), _text(element))
     for name in (*without, *(name for name in parameters.given
-                             if name.startswith(_GROUPS) and name not in _IN_ELEMENTS)):
-        yield name, CarriedParameter(_text(parameters[name]))
+                             if name.startswith(_GROUPS) and name not in in_elements)):
+        yield name, CarriedParameter(_text(kind.expanded(parameters, name)))
 
 
 def base_element(hexapod: Hexapod) -> dict[str, Any]:
@@ -81,25 +78,42 @@ def base_element(hexapod: Hexapod) -> dict[str, Any]:
 
 
 def solid_elements(hexapod: Hexapod) -> dict[str, Any]:
-    """Return the masses and inertias that ``Hexapod.solid`` has for legs with zeros (6,)."""
-    found = {}
-    for part in ('cylinder', 'piston'):
-        bodies = [hexapod.solid(getattr(leg, part), leg) for leg in hexapod.legs]
+    """Return the masses and inertias that ``Hexapod.solid`` has for legs with zeros."""
+    found: dict[str, Any] = {}
+    for n, part in enumerate(hexapod.kind.parts):
+        links = [[*leg.links][n] for leg in hexapod.legs]
+        bodies = [hexapod.solid(*each) for each in links]
         found[f'legs.{part}.mass'] = [body.mass for body in bodies]
-        found[f'legs.{part}.inertia'] = [body.inertia[0, 0] for body in bodies]
+        found[f'legs.{part}.inertia'] = [
+            body.inertia[0, 0] if link.slender else body.inertia[np.triu_indices(3)]
+            for (link, _), body in zip(links, bodies, strict=True)]
     return {name: values for name, values in found.items()
-            if not hexapod.parameters[name].all()}
+            if not np.array_equal(values, hexapod.kind.expanded(hexapod.parameters, name))}
 
 
-def length_elements(hexapod: Hexapod) -> dict[str, Any]:
-    """Return the bounds of joints that stand for limits of length that are not set (6,) [m]."""
-    bounds = np.array([leg.limits.lengths(leg.home_length) for leg in hexapod.legs])
-    bounds -= hexapod.parameters.geometry.zero_length[:, None]
-    return {name: bounds[:, side] for side, name in enumerate((LENGTH_MIN, LENGTH_MAX))
+def center_elements(hexapod: Hexapod) -> dict[str, Any]:
+    """Return the centers of mass of legs of which some have no mass, and so no center."""
+    found: dict[str, Any] = {}
+    for part in hexapod.kind.parts:
+        name, mass = f'legs.{part}.center_of_mass', hexapod.parameters[f'legs.{part}.mass']
+        centers = hexapod.kind.expanded(hexapod.parameters, name)
+        if not mass.all():
+            found[name] = np.where((mass > 0.0).reshape(6, *[1] * (centers.ndim - 1)), centers,
+                                   0.0)
+    return found
+
+
+def position_elements(hexapod: Hexapod) -> dict[str, Any]:
+    """Return the bounds of joints that stand for limits of the drives that are not set (6,)."""
+    bounds = np.array([leg.bounds() for leg in hexapod.legs])
+    bounds -= np.array([leg.branch.zero for leg in hexapod.legs])[:, None]
+    return {name: bounds[:, side] for side, name in enumerate(hexapod.kind.position_limits)
             if hexapod.parameters[name] is None}
 
 
 def _text(value: Any) -> str:
     if value is None:
         return NOT_SET
+    if isinstance(value, tuple) and isinstance(value[0], str):
+        return ' '.join(value)
     return value if isinstance(value, str) else numbers(value)

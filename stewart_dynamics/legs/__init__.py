@@ -27,6 +27,13 @@ def kind_of(values: Mapping[str, Any]) -> LegKind:
                  values[kind.marker] is not None), TELESCOPIC)
 
 
+def without_alternatives(changes: Mapping[str, Any]) -> dict[str, None]:
+    """Return the names in whose place changes give others: see ``LegKind.alternatives``."""
+    return {name: None for kind in KINDS for group in kind.alternatives for name in group
+            if not any(each in changes for each in group)
+            and any(each in changes for other in kind.alternatives for each in other)}
+
+
 def require_kind(parameters: Parameters, feature: str, *kinds: LegKind) -> None:
     """
     Raise ParameterError if a feature is not available for the legs of a hexapod.

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -13,10 +13,13 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
-from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.errors import ParameterError, shown
+from stewart_dynamics.legs import crank_tree as tree
 from stewart_dynamics.legs.kind import LegKind, LegMass, Named
 from stewart_dynamics.legs.lines import (
     AnchorCircles, AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
+from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
+from stewart_dynamics.legs.tree import LegBranch
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -62,10 +65,19 @@ class Crank(LegKind):
     massless = {
         'legs.crank.mass': 0.0, 'legs.crank.inertia': 0.0, 'legs.rod.mass': 0.0,
         'legs.rod.inertia': 0.0, 'actuator.reflected_inertia': 0.0, 'drive.motor_inertia': None}
+    parts, joints = tree.PARTS, (HINGE, UNIVERSAL)
+    elements = (
+        'actuator.reflected_inertia', 'actuator.viscous_friction', 'actuator.coulomb_friction',
+        AXES, DIRECTIONS, *(f'legs.{part}.{each}' for part in tree.PARTS
+                            for each in ('length', 'mass', 'center_of_mass', 'inertia')))
+    shortened = HEADINGS,
+    likely = {'geometry.crank_branch': (AUTO,)}
     inertia_unit = 'kg m^2'
-    home_rule = ("no level pose has all rods at the cranks' middle angles: legs.rod.length is "
-                 'shorter than the gap, or a length is in other units')
     friction_units = 'N m s/rad', 'N m'
+    alternatives = (HEADINGS,), (AXES, DIRECTIONS)
+    units = {'actuator.viscous_friction': 'N m s/rad', 'actuator.coulomb_friction': 'N m',
+             'actuator.coulomb_velocity': 'rad/s'}
+    defaults = {'actuator.coulomb_velocity': (COULOMB_VELOCITY,)}
 
     def check(self, parameters: Parameters, source: str) -> None:
         """Complete axes and directions, and defaults that differ from those of other legs."""
@@ -75,8 +87,9 @@ class Crank(LegKind):
             raise ParameterError(f'{source}: legs.rod.length: not set: needed by {self.marker}')
         if parameters.limits.lever_min is None:
             parameters._complete('limits.lever_min', np.full(6, LEVER_MIN))
-        if 'actuator.coulomb_velocity' not in given:
-            parameters._complete('actuator.coulomb_velocity', np.full(6, COULOMB_VELOCITY))
+        for name, default in self.defaults.items():
+            if name not in given:
+                parameters._complete(name, np.full(6, default))
 
     def write_fields(self, legs: Records, parameters: Parameters) -> None:
         """Write centers of mass and inertias of the cranks, and the branches that are given."""
@@ -122,7 +135,7 @@ class Crank(LegKind):
         highest = middle + math.pi if high is None else np.minimum(high, middle + math.pi)
         half = 0.5 * (highest - lowest)
         below, above = self.position_limits
-        u, z = _unit(parameters[AXES]), _unit(parameters[DIRECTIONS])
+        u, z = crank_axes(parameters)
         return AnchorCircles(
             z, np.cross(u, z), parameters['legs.crank.length'], parameters['legs.rod.length'],
             legs['branch'].copy(), parameters.limits.lever_min, 0.5 * (lowest + highest),
@@ -198,6 +211,18 @@ class Crank(LegKind):
         on_legs: Array = forces + torque * r
         return on_legs
 
+    def home_rule(self, parameters: Parameters) -> str:
+        """Return that the rods are shorter than the gap, or far too long."""
+        legs: Any = parameters.structure['legs']
+        with np.errstate(all='ignore'):
+            ends = crank_ends(parameters, legs['home_position'])
+        joints = parameters.geometry.platform_joints
+        gaps = np.linalg.norm(ends - ends.mean(axis=0) - joints + joints.mean(axis=0), axis=1)
+        rods = np.unique(parameters['legs.rod.length'])
+        return (f'legs.rod.length: {shown(rods.tolist())} m: no level pose has rods of this length'
+                ': while the platform joints are level with the ends of the cranks, at the '
+                f'middle of their angles, they are {np.mean(gaps):.3g} m away from them')
+
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
         """Take the branch whose angle at home is within the limits and a quarter turn of zero."""
@@ -211,10 +236,11 @@ class Crank(LegKind):
             angles = _angles_at(parameters, leg, position, rotation)
             name = parameters.joints[leg]
             if angles is None:
+                rod = parameters['legs.rod.length'][leg]
                 raise ParameterError(
-                    f'{parameters.source}: geometry.crank_branch: auto: the rod of {name} does '
-                    'not reach the platform at home: a length of legs.rod or legs.crank, or a '
-                    'height')
+                    f'{parameters.source}: legs.rod.length: {name}: {rod:.6g} m: does not reach '
+                    'the platform joint at home, from which geometry.crank_branch: auto follows')
+            angles = round(angles[0], 9) + 0.0, round(angles[1], 9) + 0.0  # no -3e-16
             possible = [_is_allowed(parameters, leg, angle) for angle in angles]
             if possible[0] == possible[1]:
                 words = 'both are possible' if possible[0] else 'neither is likely'
@@ -224,6 +250,51 @@ class Crank(LegKind):
                     f'with negative: {words}: give the branch, or limits of the angle')
             of['branch'][leg] = 1.0 if possible[0] else -1.0
         return True
+
+    def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
+                 size: float) -> list[LegBranch]:
+        """Return cranks and rods."""
+        return tree.branches(parameters, crank_bodies(parameters), position, rotation, mounts,
+                             size)
+
+    def tree_positions(self, parameters: Parameters, mounts: Array, position: Array,
+                       rotation: Array, home: tuple[Array, Array]) -> Array:
+        """Return angles of the cranks and of the universal joints (..., 6, 3)."""
+        return tree.tree_positions(parameters, mounts, position, rotation, home)
+
+    def tree_sampler(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
+                     ) -> Callable[[Sequence[float]], list[float]]:
+        """Return the function for one pose."""
+        return tree.tree_sampler(parameters, mounts, home)
+
+    def drive_of(self, steps: Sequence[LegJoint]) -> int | None:
+        """Return 0 if the first joint turns a crank."""
+        return tree.drive_of(steps)
+
+    def places(self, steps: Sequence[LegJoint]) -> list[str]:
+        """Return at which end of the rod each joint is."""
+        return tree.places(steps)
+
+    def parting(self, steps: Sequence[LegJoint]) -> int:
+        """Return the first joint at the end of the crank."""
+        return 1
+
+    def read_leg(self, chain: Chain, base: MechanismBody, platform: MechanismBody,
+                 said: list[str]) -> dict[str, Any]:
+        """Return the parameters of a leg in a file."""
+        return tree.read_leg(self, chain, base, platform, said)
+
+    def expanded(self, parameters: Parameters, name: str) -> Any:
+        """Return centers of mass and inertias of all bodies in full."""
+        if name in ('legs.rod.center_of_mass', 'legs.rod.inertia'):
+            return tree.rod_value(parameters, name.rpartition('.')[2])
+        bodies = crank_bodies(parameters)
+        return {'legs.crank.center_of_mass': bodies[0], 'legs.crank.inertia': bodies[1]}.get(
+            name, parameters[name])
+
+    def tidy(self, values: dict[str, Any], resolution: float) -> None:
+        """Give headings of level axes, and numbers that are the same for all cranks once."""
+        tree.tidy(values, resolution)
 
 
 class _Angle(NamedTuple):
@@ -239,7 +310,7 @@ class _Angle(NamedTuple):
 
 def _angle_of(parameters: Parameters, position: Array, rotation: Array) -> _Angle:
     legs: Any = parameters.structure['legs']
-    u, z = _unit(parameters[AXES]), _unit(parameters[DIRECTIONS])
+    u, z = crank_axes(parameters)
     n0 = np.cross(u, z)
     size, rod = parameters['legs.crank.length'], parameters['legs.rod.length']
     arms = joint_arms(rotation, parameters.geometry.platform_joints)
@@ -274,7 +345,7 @@ def _crank_axes(parameters: Parameters, at: Lines) -> Array:
     assert at.path is not None
     size = parameters['legs.crank.length'][:, None]
     e, n = -at.path.curvatures / size, at.path.tangents / size
-    return np.stack([e, n, np.broadcast_to(_unit(parameters[AXES]), e.shape)], axis=-2)
+    return np.stack([e, n, np.broadcast_to(crank_axes(parameters)[0], e.shape)], axis=-2)
 
 
 def _forces_at_rest(parameters: Parameters, at: Lines, at_center: Array, at_tip: Array,
@@ -321,19 +392,25 @@ def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
     return centers, inertias
 
 
+def _unit(vectors: Array) -> Array:
+    with np.errstate(all='ignore'):
+        units: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return units
+
+
 def crank_ends(parameters: Parameters, angles: Array) -> Array:
     """Return the ends of the cranks (6, 3) at their angles (6,), base frame [m]."""
-    u, z = _unit(parameters[AXES]), _unit(parameters[DIRECTIONS])
+    u, z = crank_axes(parameters)
     along = z * np.cos(angles)[:, None] + np.cross(u, z) * np.sin(angles)[:, None]
     sizes = parameters['legs.crank.length'][:, None]
     ends: Array = parameters.geometry.base_joints + sizes * along
     return ends
 
 
-def _unit(vectors: Array) -> Array:
-    with np.errstate(all='ignore'):
-        units: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return units
+def crank_axes(parameters: Parameters) -> tuple[Array, Array]:
+    """Return the axes of the motors and the cranks at the angle 0, unit vectors (6, 3) each."""
+    legs: Any = parameters.structure['legs']
+    return legs['crank_axis'], legs['crank_direction']
 
 
 def _branches(parameters: Parameters) -> tuple[str, ...]:
@@ -345,16 +422,17 @@ def _complete_axes(parameters: Parameters, source: str) -> None:
     """Set axes and directions that follow from headings; level axes lift at a positive angle."""
     headings, axes, directions = (parameters[name] for name in (HEADINGS, AXES, DIRECTIONS))
     if headings is None:
+        if axes is None and directions is None:
+            raise ParameterError(f'{source}: {HEADINGS}: not set: needed by {Crank.marker}; or '
+                                 f'give {AXES} and {DIRECTIONS}')
         for name, other in ((AXES, DIRECTIONS), (DIRECTIONS, AXES)):
             if parameters[name] is None:
-                needed = (f'{other}' if parameters[other] is not None else Crank.marker)
-                raise ParameterError(f'{source}: {name}: not set: needed by {needed}; or give '
-                                     f'{HEADINGS}')
+                raise ParameterError(f'{source}: {name}: not set: needed by {other}')
         for name, given in ((AXES, axes), (DIRECTIONS, directions)):
-            if not np.linalg.norm(given, axis=-1).all():
-                leg = int(np.argmin(np.linalg.norm(given, axis=-1)))
-                raise ParameterError(f'{source}: {name}: {given[leg].tolist()}: a direction must '
-                                     'not be 0, 0, 0')
+            if not given.any(axis=-1).all():
+                leg = int(np.argmin(given.any(axis=-1)))
+                raise ParameterError(f'{source}: {name}: {parameters.joints[leg]}: '
+                                     f'{given[leg].tolist()}: a direction must not be 0, 0, 0')
         return
     cosine, sine, level = np.cos(headings), np.sin(headings), np.zeros(6)
     found = {AXES: np.stack([sine, -cosine, level], axis=-1),
@@ -369,7 +447,7 @@ def _complete_axes(parameters: Parameters, source: str) -> None:
 def _angles_at(parameters: Parameters, leg: int, position: Array, rotation: Array,
                ) -> tuple[float, float] | None:
     """Return the angles of a crank with both branches in a pose [rad]; None: out of reach."""
-    u, z = (_unit(parameters[name])[leg] for name in (AXES, DIRECTIONS))
+    u, z = (axes[leg] for axes in crank_axes(parameters))
     line = position + rotation @ parameters.geometry.platform_joints[leg] - (
         parameters.geometry.base_joints[leg])
     size, rod = parameters['legs.crank.length'][leg], parameters['legs.rod.length'][leg]

@@ -19,8 +19,10 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import KINDS, places
-from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs.lines import AnchorCircles, Lines
+from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, UNIVERSAL
+from stewart_dynamics.legs.tree import LegBranch
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -84,6 +86,19 @@ class LegKind(ABC):
         Masses and moments in the regressor, in the order of the columns in C.
     massless : mapping
         Values of parameters with which the legs and the drives have no mass.
+    parts : tuple of str
+        Names of the two bodies of a leg, from the base on.
+    joints : tuple of str
+        Joints that carry them: UNIVERSAL, and that of the drive, SLIDE or HINGE.
+    elements : tuple of str
+        Parameters of this kind, in addition to its limits, that all formats of other tools have
+        elements for.
+    shortened : tuple of str
+        Parameters that stand for several of ``elements``.
+    likely : mapping
+        Values of parameters that let the assembly of the legs follow from the other ones.
+    zero : str
+        The parameter by which the zero of the drive is chosen; empty: its joint has that zero.
 
     """
 
@@ -105,7 +120,15 @@ class LegKind(ABC):
     fields: Mapping[str, str]
     masses: tuple[LegMass, ...]
     massless: Mapping[str, Any]
-    home_rule: str  # what a file lacks that gives no home pose
+    parts: tuple[str, str]
+    joints: tuple[str, str]
+    elements: tuple[str, ...]
+    shortened: tuple[str, ...] = ()
+    zero: str = ''
+    likely: Mapping[str, Any] = {}
+    alternatives: tuple[tuple[str, ...], ...] = ()  # parameters, or others in their place
+    units: Mapping[str, str] = {}  # of parameters, other than in the table
+    defaults: Mapping[str, Any] = {}  # the same
     inertia_unit: str  # of the reflected inertia of a drive
     friction_units: tuple[str, str]  # viscous and Coulomb
 
@@ -119,6 +142,18 @@ class LegKind(ABC):
         """Return where the efforts to command are in a row of outputs."""
         place: slice = _OUTPUT[self.commands]
         return place
+
+    @property
+    def drive_joint(self) -> str:
+        """Return the joint that the drive moves: SLIDE or HINGE."""
+        return next(joint for joint in self.joints if joint != UNIVERSAL)
+
+    @property
+    def drive_limits(self) -> dict[str, str]:
+        """Return the limits that formats have at the joint of a drive: fields of ``Joint``."""
+        low, high = self.position_limits
+        return {low: 'lower', high: 'upper', self.rate_limit: 'velocity_max',
+                self.effort_limit: 'force_max'}
 
     def check(self, parameters: Parameters, source: str) -> None:
         """Check the rules between the parameters of this kind, and complete them."""
@@ -179,6 +214,10 @@ class LegKind(ABC):
         (..., 3): angular velocity and acceleration of the base.
         """
 
+    @abstractmethod
+    def home_rule(self, parameters: Parameters) -> str:
+        """Return which rule parameters break that give no home pose."""
+
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
         """
@@ -187,6 +226,64 @@ class LegKind(ABC):
         home: a function that returns position (3,) and rotation (3, 3) at home.
         """
         return False
+
+    @abstractmethod
+    def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
+                 size: float) -> list[LegBranch]:
+        """
+        Return the six legs at a pose at home, as branches of a tree.
+
+        mounts: rotations (6, 3, 3) from the axes of universal joints at home, z nearly along the
+            lines of force, to base axes.
+        size: mean distance of the platform joints from their center, for shapes [m].
+        """
+
+    @abstractmethod
+    def tree_positions(self, parameters: Parameters, mounts: Array, position: Array,
+                       rotation: Array, home: tuple[Array, Array]) -> Array:
+        """
+        Return the positions of the joints of the legs in poses (..., 6, 3) [m, rad].
+
+        home: position (3,) and rotation (3, 3) where the angles of universal joints are zero.
+        """
+
+    @abstractmethod
+    def tree_sampler(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
+                     ) -> Callable[[Sequence[float]], list[float]]:
+        """Return a function that gives the same (18,), fast, for one pose as a row (12,)."""
+
+    @abstractmethod
+    def drive_of(self, steps: Sequence[LegJoint]) -> int | None:
+        """Return which joint of a leg in a file is the drive; None: not a leg of this kind."""
+
+    @abstractmethod
+    def places(self, steps: Sequence[LegJoint]) -> list[str]:
+        """Return where each of these joints is, in words; the drive has none."""
+
+    @abstractmethod
+    def parting(self, steps: Sequence[LegJoint]) -> int:
+        """Return which of these joints is between the bodies of its two parts."""
+
+    @abstractmethod
+    def read_leg(self, chain: Chain, base: MechanismBody, platform: MechanismBody,
+                 said: list[str]) -> dict[str, Any]:
+        """
+        Return the parameters of a leg in a file, and 'direction', from base to platform.
+
+        said: gets one line for each assumption.
+        """
+
+    def expanded(self, parameters: Parameters, name: str) -> Any:
+        """Return the value of a parameter, of bodies as ``read_leg`` gives it for six legs."""
+        return parameters[name]
+
+    def tidy(self, values: dict[str, Any], resolution: float) -> None:
+        """
+        Bring parameters of six legs that were read into the shortest form.
+
+        resolution: numbers that differ by a smaller part are equal.
+        """
+        del values, resolution
 
 
 def check_foreign(parameters: Parameters, kind: LegKind, kinds: Sequence[LegKind],
@@ -199,7 +296,8 @@ def check_foreign(parameters: Parameters, kind: LegKind, kinds: Sequence[LegKind
         # A whole set of parameters, as dict(parameters), gives the defaults, too.
         if owner is None or np.size(default) > 0 and np.all(value == np.asarray(default)):
             continue
+        unit = parameters.table[name].unit
+        words = f'{source}: {name}: {shown(value)}{f" {unit}" if unit else ""}'
         if kind.marker:
-            raise ParameterError(
-                f'{source}: {name}: of hexapods without {kind.marker}, which is given')
-        raise ParameterError(f'{source}: {name}: {owner.marker} is not set: needed by it')
+            raise ParameterError(f'{words}: must not be given with {kind.marker}')
+        raise ParameterError(f'{words}: needs {owner.marker}, which is not set')

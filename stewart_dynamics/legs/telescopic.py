@@ -5,14 +5,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple, TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.legs import telescopic_tree as tree
 from stewart_dynamics.legs.kind import LegKind, LegMass, Named
 from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
+from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, SLIDE, UNIVERSAL
+from stewart_dynamics.legs.tree import LegBranch
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -34,7 +37,7 @@ class Telescopic(LegKind):
            'geometry.platform_outline', 'limits.length_', 'limits.velocity_max',
            'limits.force_max', 'limits.joint_force_max', 'limits.base_joint_angle_max',
            'limits.leg_clearance_min', 'drive.screw_', 'drive.base_universal_axes',
-           'drive.platform_universal_axes')
+           'drive.platform_universal_axes', 'meshes.cylinder', 'meshes.piston')
     fields = {
         'zero_length': 'geometry.zero_length', 'cylinder_mass': 'legs.cylinder.mass',
         'cylinder_center_of_mass': 'legs.cylinder.center_of_mass',
@@ -50,9 +53,13 @@ class Telescopic(LegKind):
         'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.piston.mass': 0.0,
         'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
         'drive.screw_inertia': None}
+    parts, joints = tree.PARTS, (UNIVERSAL, SLIDE)
+    elements = ('actuator.reflected_mass', 'actuator.viscous_friction',
+                'actuator.coulomb_friction', *(
+                    f'legs.{part}.{each}' for part in tree.PARTS
+                    for each in ('mass', 'center_of_mass', 'inertia')))
+    zero = 'geometry.zero_length'
     inertia_unit = 'kg'
-    home_rule = ('limits.length_min and limits.length_max, or geometry.zero_length, must give a '
-                 'length that the legs can have in a level pose')
     friction_units = 'N s/m', 'N'
 
     def write_fields(self, legs: Records, parameters: Parameters) -> None:
@@ -139,6 +146,45 @@ class Telescopic(LegKind):
             + (per_leg(terms.inertia * at.lengths) * terms.across @ carried[..., None])[..., 0]
             - (moment * q_squared)[..., None] * at.directions)
         return on_legs
+
+    def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
+                 size: float) -> list[LegBranch]:
+        """Return cylinders and pistons."""
+        return tree.branches(parameters, position, rotation, mounts, size)
+
+    def tree_positions(self, parameters: Parameters, mounts: Array, position: Array,
+                       rotation: Array, home: tuple[Array, Array]) -> Array:
+        """Return angles of the universal joints and positions of the slides (..., 6, 3)."""
+        return tree.tree_positions(parameters, mounts, position, rotation)
+
+    def tree_sampler(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
+                     ) -> Callable[[Sequence[float]], list[float]]:
+        """Return the function for one pose."""
+        return tree.tree_sampler(parameters, mounts)
+
+    def drive_of(self, steps: Sequence[LegJoint]) -> int | None:
+        """Return which joint slides."""
+        return tree.drive_of(steps)
+
+    def places(self, steps: Sequence[LegJoint]) -> list[str]:
+        """Return the side of the slide on which each joint is."""
+        at = tree.drive_of(steps) or 0
+        return ['base'] * at + [''] + ['platform'] * (len(steps) - at - 1)
+
+    def parting(self, steps: Sequence[LegJoint]) -> int:
+        """Return which joint slides."""
+        return tree.drive_of(steps) or 0
+
+    def read_leg(self, chain: Chain, base: MechanismBody, platform: MechanismBody,
+                 said: list[str]) -> dict[str, Any]:
+        """Return the parameters of a leg in a file."""
+        return tree.read_leg(self, chain, base, platform, said)
+
+    def home_rule(self, parameters: Parameters) -> str:
+        """Return that the mean length is missing, or too short."""
+        del parameters
+        return ('home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
+                'must give a length that the legs can have in a level pose')
 
 
 class _Terms(NamedTuple):

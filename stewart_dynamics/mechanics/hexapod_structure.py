@@ -10,13 +10,12 @@ A hexapod as the C library takes it: the structure ``stewart_platform`` of param
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.mechanics.drives.turning_screws import motor_turns, screw_constants
-from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
+from stewart_dynamics.mechanics.kinematics.home_pose import choose_branch
 from stewart_dynamics.mechanics.kinematics.joint_axes import AXES, joint_axes
 from stewart_dynamics.mechanics.limits import OF_JOINTS
 from stewart_dynamics.mechanics.rows import BASE_AXIS, PLATFORM_AXIS
@@ -33,7 +32,7 @@ def hexapod_structure(parameters: Parameters, screws: Array | None = None,
 
     Raises ParameterError: axes that are needed are not given, and there is no home pose.
     """
-    parameters.choose_branch(partial(home_at, parameters))
+    choose_branch(parameters)
     hexapod: Any = parameters.structure.copy()
     legs = hexapod['legs']
     if parameters.drive.screw_rotation == UNIVERSAL:
@@ -46,12 +45,6 @@ def hexapod_structure(parameters: Parameters, screws: Array | None = None,
     function('stewart_complete')(hexapod)
     hexapod['with_joint_angles'] = bool(axes)
     return hexapod  # type: ignore[no-any-return]
-
-
-def home_at(parameters: Parameters) -> tuple[Array, Array]:
-    """Return position (3,) [m] and rotation (3, 3) of the home pose."""
-    home = home_pose(parameters)
-    return home.position, home.rotation
 
 
 def limited_structure(parameters: Parameters) -> Records:

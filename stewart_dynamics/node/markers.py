@@ -16,8 +16,9 @@ from struct import pack, Struct
 
 import numpy as np
 from stewart_dynamics.arrays import Array, SECOND
-from stewart_dynamics.description.hexapod import (
-    BALL, BARREL, BARREL_LENGTH, Color, COLORS, PLATE, ROD)
+from stewart_dynamics.description.hexapod import Color, COLORS
+from stewart_dynamics.legs.telescopic_tree import BARREL_LENGTH
+from stewart_dynamics.legs.tree import BALL, BARREL, PLATE, ROD
 from stewart_dynamics.mechanics.frames.rotation import quaternion_of
 from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
 from stewart_dynamics.mechanics.limits import Exceedance

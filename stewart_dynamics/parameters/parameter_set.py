@@ -430,12 +430,24 @@ class ParameterSet(ParameterGroup, Mapping[str, Any]):
         """Return the values to write, and the comment behind each."""
         values = {name: self._given.get(name, parameter.default)
                   for name, parameter in self.table.items()
-                  if name in self._given or not name.startswith(self.described)}
+                  if name in self._given or not name.startswith(self._only_given())}
         added = comments or {}
-        texts = {name: '; '.join(filter(None, (parameter.unit, added.get(name))))
-                 for name, parameter in self.table.items()}
+        texts = {name: '; '.join(filter(None, (self.unit_of(name), added.get(name))))
+                 for name in self.table}
         return {name: value for name, value in values.items()
                 if value is not None and value != ()}, texts
+
+    def default_of(self, name: str) -> Any:
+        """Return the default of a parameter."""
+        return self.table[name].default
+
+    def unit_of(self, name: str) -> str:
+        """Return the unit of a parameter."""
+        return self.table[name].unit
+
+    def _only_given(self) -> tuple[str, ...]:
+        """Return beginnings of the names that a file has only if they are given."""
+        return self.described
 
     @classmethod
     def check_file(cls, path: str | Path) -> None:

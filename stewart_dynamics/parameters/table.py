@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import CONSTANTS, Rule
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.legs import kind_of, KINDS
+from stewart_dynamics.legs import kind_of, KINDS, without_alternatives
 from stewart_dynamics.legs.crank import BRANCHES
 from stewart_dynamics.legs.kind import check_foreign, LegKind
 from stewart_dynamics.parameters.body import Body, BodyError
@@ -672,8 +672,8 @@ class Parameters(ParameterSet):
     autostart: bool = declare('configure and activate the node when it starts', default=True)
 
     node = 'stewart_dynamics'
-    # The reflected mass may follow from drive.*; heights belong to circles.
-    described = ('cueing.', 'drive.', 'actuator.reflected_mass',
+    # The reflected inertia may follow from drive.*; heights belong to circles.
+    described = ('cueing.', 'drive.', 'actuator.reflected_',
                  *(circle_names(body)[2] for body in BODIES))
     drives: tuple[str, ...]  # names of drive.* that are given; without them no motors are computed
     carried: Body  # by the legs: platform and payload as one
@@ -718,6 +718,9 @@ class Parameters(ParameterSet):
             return ('geometry.platform_angles' if self.geometry.platform_angles is not None
                     else name) + f': {text}'
         value = np.asarray(self[name])
+        if where >= 0 and value.ndim == 2 and name.startswith(self.leg_kind.own) and (
+                self.leg_kind.marker):
+            return f'{name}: {self.joints[where]}: {value[where].tolist()}: {text}'
         words = f'{name}: {value.tolist()}: {text}'
         other = text.rpartition(' ')[2]
         if other in self.table:
@@ -796,10 +799,28 @@ class Parameters(ParameterSet):
 
     def replaced(self, changes: Mapping[str, Any], source: str = '', *,
                  exact_types: bool = False) -> Self:
-        """Return a copy with these values changed; new joints are points or on a circle."""
-        dropped = without_other(changes) if isinstance(changes, Mapping) else {}
+        """
+        Return a copy with these values changed.
+
+        New joints are points or on a circle, in place of the other; likewise the directions of a
+        kind of legs.
+        """
+        dropped = without_other(changes) | without_alternatives(changes) if isinstance(
+            changes, Mapping) else {}
         return super().replaced({**dropped, **changes} if dropped else changes, source,
                                 exact_types=exact_types)
+
+    def default_of(self, name: str) -> Any:
+        """Return the default of a parameter, which may depend on the kind of legs."""
+        return self.leg_kind.defaults.get(name, super().default_of(name))
+
+    def unit_of(self, name: str) -> str:
+        """Return the unit of a parameter, which may depend on the kind of legs."""
+        return self.leg_kind.units.get(name, super().unit_of(name))
+
+    def _only_given(self) -> tuple[str, ...]:
+        """Return also the names without a meaning for the legs, or with another default."""
+        return *self.described, *self.leg_kind.foreign, *self.leg_kind.defaults
 
     def with_points(self) -> Self:
         """Return a copy whose joints are given as points."""

@@ -66,7 +66,7 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
             raise ParameterError(
                 f'{exc}; a file is given by --params-file after --ros-args') from exc
         raise _of_other_nodes(files, node.get_fully_qualified_name()) or exc from exc
-    for name, parameter in kind.table.items():
+    for name in kind.table:
         unchecked = ParameterDescriptor(dynamic_typing=True)
         if name in given:
             node.set_descriptor(name, unchecked)
@@ -76,7 +76,7 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
             continue
         if node.has_parameter(name):
             node.undeclare_parameter(name)
-        default = parameter.default
+        default = parameters.default_of(name)
         if isinstance(default, tuple):
             default = list(default) or None
         node.declare_parameter(name, default, unchecked, ignore_override=True)

@@ -102,8 +102,21 @@ def home_pose(parameters: Parameters) -> Pose:
             'limits.length_min and limits.length_max on the '
             f'{POSITIVE if home.side > 0.0 else NEGATIVE} side of the base')
     if home.length is None:
-        raise ParameterError(f'{parameters.source}: home pose: {parameters.leg_kind.home_rule}')
+        raise ParameterError(f'{parameters.source}: {parameters.leg_kind.home_rule(parameters)}')
     return Pose(home.positions[0], home.rotations[0])
+
+
+def choose_branch(parameters: Parameters) -> None:
+    """
+    Set the assembly of the legs that the parameters leave open.
+
+    Raises ParameterError: there is no home pose, or it does not decide it.
+    """
+    def at_home() -> tuple[Array, Array]:
+        home = home_pose(parameters)
+        return home.position, home.rotation
+
+    parameters.choose_branch(at_home)
 
 
 def determinant_at_home(parameters: Parameters) -> float:

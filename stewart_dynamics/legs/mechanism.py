@@ -3,13 +3,15 @@
 
 
 """
-A mechanism as the readers of all formats return it: bodies, joints and loops, in world axes.
+Bodies, joints and loops in the files of other tools, as all readers and writers name them.
 
-Everything is placed as the file has it, at the positions of the joints that the file has.
+A mechanism is in world axes. Everything is placed as the file has it, at the positions of the
+joints that the file has.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
@@ -22,11 +24,6 @@ from stewart_dynamics.errors import StewartError
 WORLD = 'world'
 FIXED, HINGE, UNIVERSAL, BALL, SLIDE, OTHER = (
     'fixed', 'hinge', 'universal', 'ball', 'slide', 'other')
-
-
-OF_SLIDE = {'limits.length_min': 'lower', 'limits.length_max': 'upper',
-            'limits.velocity_max': 'velocity_max', 'limits.force_max': 'force_max'}
-"""Parameters of limits that formats have on the slide of a leg, and the fields of ``Joint``."""
 
 
 class CarriedParameter(NamedTuple):
@@ -101,7 +98,7 @@ class Joint:
     axes: list[Array] = field(default_factory=list)  # unit vectors, in world axes
     child_anchor: Array | None = None
     """The same point on the child's side, where it is given on its own [m]."""
-    position: float = 0.0  # position of a slide at the placements of the file [m]
+    position: float = 0.0  # of a slide or hinge at the placements of the file [m, rad]
     lower: float | None = None
     upper: float | None = None
     velocity_max: float | None = None
@@ -113,6 +110,7 @@ class Joint:
     """What acts on it at rest as well and has no parameter."""
     left_out: list[str] = field(default_factory=list)
     """What else acts on it or limits it and has no parameter."""
+    actuators: list[str] = field(default_factory=list)  # names
     remarks: list[str] = field(default_factory=list)  # assumptions of the reader about it
     without: set[str] = field(default_factory=set)
     """Fields above that the file has, but not as a parameter can have them."""
@@ -159,7 +157,78 @@ class Mechanism:
     carried: dict[str, CarriedParameter] = field(default_factory=dict)
     """Parameters that stewart_describe has added to the format, by their names."""
     resolution: float = 1e-9  # numbers of the file that differ by a smaller part are equal
-    order: tuple[str, ...] = ()  # names of slides in the order of their actuators
+    order: tuple[str, ...] = ()  # names of joints in the order of their actuators
     remarks: list[str] = field(default_factory=list)  # assumptions of the reader, one line each
     warnings: list[str] = field(default_factory=list)
     """What acts at rest and has no parameter, one line each."""
+
+
+class LegJoint(NamedTuple):
+    """A joint of a leg, on the way from the base to the platform."""
+
+    joint: Joint
+    from_parent: bool  # whether its parent is the body on the side of the base
+
+    @property
+    def near(self) -> Array:
+        """Return its point on the side of the base [m]."""
+        return self._point(self.from_parent)
+
+    @property
+    def far(self) -> Array:
+        """Return its point on the side of the platform [m]."""
+        return self._point(not self.from_parent)
+
+    @property
+    def axis(self) -> Array:
+        """Return its axis, along or about which the side of the platform moves."""
+        return self.joint.axes[0] if self.from_parent else -self.joint.axes[0]
+
+    def _point(self, on_parent: bool) -> Array:
+        on_child = self.joint.child_anchor
+        return self.joint.anchor if on_parent or on_child is None else on_child
+
+
+class Chain(NamedTuple):
+    """A leg as found."""
+
+    steps: list[LegJoint]
+    drive: int  # which step its motor moves
+    lower: list[MechanismBody]  # its bodies from the base on
+    upper: list[MechanismBody]  # those up to the platform
+    places: list[str]  # where the joints are, in words; empty for the drive
+
+    def where(self, n: int) -> str:
+        """Return which joint of a leg it is, in words; nothing for the joint of its drive."""
+        return f' of its joints at the {self.places[n]}' if self.places[n] else ''
+
+    @property
+    def driven(self) -> LegJoint:
+        """Return the joint that its motor moves."""
+        return self.steps[self.drive]
+
+
+class JoinedBody(NamedTuple):
+    """Several bodies as one, in the axes of a frame."""
+
+    mass: float
+    center: Array
+    inertia: Array
+
+
+def joined(parts: Iterable[MechanismBody], frame: Placement) -> JoinedBody:
+    """Return several bodies as one, in a frame."""
+    heavy = [part for part in parts if part.mass]
+    if not heavy:
+        return JoinedBody(0.0, np.zeros(3), np.zeros((3, 3)))
+    if len(heavy) == 1 and heavy[0].placement is frame:
+        return JoinedBody(heavy[0].mass or 0.0, heavy[0].center, heavy[0].inertia)
+    masses = np.array([part.mass for part in heavy])
+    centers = np.array([frame.inside(part.placement.point(part.center)) for part in heavy])
+    center = masses @ centers / masses.sum()
+    inertia = np.zeros((3, 3))
+    for part, mass, at in zip(heavy, masses, centers, strict=True):
+        turn, arm = frame.rotation.T @ part.placement.rotation, at - center
+        inertia += turn @ part.inertia @ turn.T + mass * (arm @ arm * np.eye(3)
+                                                          - np.outer(arm, arm))
+    return JoinedBody(float(masses.sum()), center, inertia)
