@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any, NamedTuple
 
 from crank_machines import random_machine, random_state
@@ -13,7 +12,7 @@ from crank_newton_euler import CrankHexapod, State
 from crank_platforms import base_of, motion_of, parameters_of
 import numpy as np
 import pytest
-from referees import random_direction, rng, rotation_about, ROOT
+from referees import random_direction, rng, ROOT, rotation_about
 from stewart_dynamics import (
     BaseMotion, Capability, Motion, Parameters, Pose, StewartPlatform)
 from stewart_dynamics.arrays import Array
@@ -21,7 +20,6 @@ from stewart_dynamics.capability.capability import Extent
 from stewart_dynamics.capability.motions import Deviations, faster
 from stewart_dynamics.errors import MotionError, ParameterError, ReachError
 from stewart_dynamics.mechanics.dynamics.linear_parameters import with_point_mass
-from stewart_dynamics.mechanics.stiffness import platform_stiffness
 
 FILE = ROOT / 'config' / 'crank_platform.yaml'
 MACHINES, TRAVELS = range(100), 20
@@ -84,8 +82,8 @@ def moved(pose: Pose, direction: Array, pivot: Array, travels: Array) -> tuple[A
     angles = (turn * travels)[:, None, None]
     turns = (np.eye(3) + np.sin(angles) * spin + (1.0 - np.cos(angles)) * spin @ spin
              ) @ pose.rotation
-    return (pose.position + pose.rotation @ pivot + travels[:, None] * direction[:3]
-            - turns @ pivot), turns
+    center: Array = pose.position + pose.rotation @ pivot
+    return center + travels[:, None] * direction[:3] - turns @ pivot, turns
 
 
 def condition_at_home(machine: CrankHexapod) -> float:
@@ -120,7 +118,7 @@ def limits_of(machine: CrankHexapod, random: np.random.Generator) -> dict[str, A
 
 def direction_of(kind: int, machine: CrankHexapod, random: np.random.Generator) -> Array:
     """Return a random translation, rotation, or both."""
-    way = random.normal(size=6) * np.repeat([machine.crank.mean(), 1.0], 3)
+    way: Array = random.normal(size=6) * np.repeat([machine.crank.mean(), 1.0], 3)
     if kind % 3 < 2:
         way[slice(3, 6) if kind % 3 == 0 else slice(0, 3)] = 0.0
     return way
@@ -296,7 +294,8 @@ def test_motions_as_fast_and_as_large_as_limits_permit(seed: int) -> None:
     assert np.abs(np.array(found) - 1.0).max() < EXACT
     extent = c.amplitude_factor(motion, None, wrench)
     if extent.limit in ('crank_speed_max', 'crank_torque_max', 'rod_force_max'):
-        rows = Deviations(Motion(motion.position[0], motion.rotation[0]), motion.rows).at(extent.value)
+        center = Motion(motion.position[0], motion.rotation[0])
+        rows = Deviations(center, motion.rows).at(extent.value)
         assert np.abs(np.array(largest(Motion.of_rows(rows))) - 1.0).max() < EXACT
 
 
@@ -304,10 +303,11 @@ def test_motors_limit_the_torques_of_cranks() -> None:
     machine, _, states = loaded(0)
     rest = StewartPlatform(parameters_of(machine)).inverse_dynamics(
         Motion(machine.home, np.eye(3)))
+    continuous = 3.0 * np.abs(rest.torques).max() / 20.0
     platform = StewartPlatform(parameters_of(machine, **{
         'drive.gear_ratio': 20.0, 'drive.efficiency': 0.8,
         'drive.torque_max': 5.0 * np.abs(rest.torques).max() / 20.0, 'drive.speed_max': 60.0,
-        'drive.torque_continuous': 3.0 * np.abs(rest.torques).max() / 20.0}))
+        'drive.torque_continuous': continuous}))
     c = Capability(platform)
     for state in states:
         pose = still(state)
@@ -323,14 +323,13 @@ def test_motors_limit_the_torques_of_cranks() -> None:
             assert abs(np.abs(platform.motors(moving).speeds).max() / 60.0 - 1.0) < EXACT
             held = c.wrench(pose, way, continuous=True)
             torques = platform.motors(pose, -held.value * way).torques
-            assert np.abs(torques).max() <= (
-                platform.parameters.drive.torque_continuous.max() * (1.0 + EXACT))
+            assert np.abs(torques).max() <= continuous * (1.0 + EXACT)
 
 
 @pytest.mark.parametrize('seed', range(6))
 def test_stiffness_is_minus_the_derivative_of_the_wrench_of_springs(seed: int) -> None:
     _, platform, states = loaded(seed)
-    c, springs = Capability(platform), 1e3 * np.arange(1.0, 7.0)
+    c, springs = Capability(platform), np.linspace(1e3, 6e3, 6)
     for state in states[:3]:
         pose = Pose(state.t, state.R)
         held, angles = platform.inverse_dynamics(Motion.from_pose(pose)).torques, (
@@ -349,7 +348,7 @@ def test_stiffness_is_minus_the_derivative_of_the_wrench_of_springs(seed: int) -
         expected = np.stack(columns, axis=-1)
         found = c.stiffness(pose, springs)
         assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
-        still_springs = platform_stiffness(platform.drive_jacobian(pose), springs)
+        still_springs = platform.stiffness(pose, springs)
         assert np.abs(found - still_springs).max() > 1e-6 * np.abs(expected).max()
 
 
@@ -364,3 +363,106 @@ def test_a_stuck_crank_keeps_its_angle() -> None:
         assert abs(speeds[3]) < 1e-9 * np.abs(speeds).max()
     assert found.velocity is not None
     assert (found.velocity.leg != 3).all()
+
+
+def box_of(machine: CrankHexapod, random: np.random.Generator, size: float) -> Array:
+    """Return random ranges with zero in them."""
+    half = size * np.repeat([machine.crank.mean(), 0.5], 3) * random.uniform(0.2, 1.0, (2, 6))
+    found: Array = np.stack([-half[0], half[1]], axis=1)
+    found[random.uniform(size=6) < 0.3] = 0.0
+    return found if np.ptp(found) > 0.0 else box_of(machine, random, size)
+
+
+def points_in(box: Array, random: np.random.Generator, count: int) -> Array:
+    """Return the corners of a box, and points inside and on its sides."""
+    bits = (np.arange(64)[:, None] >> np.arange(6)) & 1
+    corners = np.where(bits == 1, box[:, 1], box[:, 0])
+    inside = random.uniform(box[:, 0], box[:, 1], (count, 6))
+    sides = np.where(random.uniform(size=(count, 6)) < 0.3, inside,
+                     corners[random.integers(64, size=count)])
+    return np.concatenate([np.zeros((1, 6)), corners, inside, sides])
+
+
+def excess(machine: CrankHexapod, p: Parameters, pose: Pose, pivot: Array, points: Array) -> Array:
+    """Return the largest excess of each point (N,)."""
+    poses = [moved(pose, each, pivot, np.ones(1)) for each in points]
+    scan = scanned(machine, p, *(np.concatenate(each) for each in zip(*poses, strict=True)))
+    largest: Array = np.max([each if each.ndim == 1 else each.max(axis=1) for each in scan],
+                            axis=0)
+    return largest
+
+
+@pytest.mark.parametrize('first', range(0, 30, 5))
+def test_boxes_agree_with_samples(first: int) -> None:
+    answers = []
+    for seed in range(first, first + 5):
+        random = rng(seed)
+        machine = random_machine(random, 0.0)
+        p = parameters_of(machine, **limits_of(machine, random))
+        c, pose = Capability(StewartPlatform(p)), Pose(machine.home, np.eye(3))
+        pivot = random.normal(size=3) * machine.crank.mean()
+        if excess(machine, p, pose, pivot, np.zeros((1, 6))) > 0.0:
+            continue
+        for size in (0.1, 0.4, 1.0):
+            box = box_of(machine, random, size)
+            found = c.reachable(box, pose, pivot)
+            points = points_in(box, random, 1000)
+            largest = excess(machine, p, pose, pivot, points).max()
+            worst = found.worst
+            at = scanned(machine, p, *(np.stack([np.eye(3) if n else machine.home, each])
+                                       for n, each in enumerate(
+                                           (worst.pose.position, worst.pose.rotation))))
+            if found.certain:
+                assert largest <= 1e-9
+                assert worst.excess <= 1e-9
+            else:
+                assert worst.excess > 0.0
+                assert max(float(each[1].max()) for each in at) > 0.0
+            answers.append(found.certain)
+        factor = c.reachable_factor(box, pose, pivot)
+        assert 0.0 < factor.value <= factor.upper
+        assert excess(machine, p, pose, pivot, factor.value * points).max() <= 1e-9
+        if factor.limit != 'singularity':
+            assert factor.upper / factor.value < 1.0 + 1e-8
+    assert {True, False} <= set(answers)
+
+
+def test_a_box_out_of_reach_names_the_leg() -> None:
+    platform = StewartPlatform.from_yaml(FILE)
+    c = Capability(StewartPlatform(platform.parameters.replaced({
+        'limits.lever_min': 0.0, 'limits.angle_min': None, 'limits.angle_max': None})))
+    found = c.reachable(np.outer([0, 0, 1, 0, 0, 0], [0.0, 0.3]))
+    assert (found.certain, found.worst.limit, found.worst.excess) == (False, 'lever_min', np.inf)
+    with pytest.raises(ReachError, match='leg_'):
+        platform.inverse_dynamics(Motion.from_pose(found.worst.pose))
+    up = c.travel(platform.home_pose(), [0, 0, 1, 0, 0, 0])
+    reach = platform.home_pose().position + [0, 0, up.value]
+    assert np.abs(c.platform.inverse_dynamics(Motion.from_pose(Pose(
+        reach - [0, 0, 1e-12], np.eye(3)))).levers).min() < 1e-5
+    with pytest.raises(ReachError):
+        c.platform.inverse_dynamics(Motion.from_pose(Pose(reach + [0, 0, 1e-9], np.eye(3))))
+    out = Pose(reach + [0, 0, 0.1], np.eye(3))
+    ended = c.travel(out, [0, 0, -1, 0, 0, 0])
+    assert (ended.value, ended.limit) == (0.0, 'lever_min')
+    with pytest.raises(ReachError):
+        c.wrench(out, np.eye(6)[0])
+
+
+def test_what_limits_nothing_and_what_is_not_known() -> None:
+    given = Parameters.from_yaml(FILE)
+    c = Capability(StewartPlatform(given.replaced({
+        'limits.torque_max': None, 'limits.rod_force_max': None, 'limits.speed_max': None})))
+    home = c.platform.home_pose()
+    with pytest.raises(ParameterError, match=r'limits\.torque_max: not set'):
+        c.wrench(home, np.eye(6)[0])
+    with pytest.raises(ParameterError, match=r'limits\.speed_max: not set'):
+        c.velocity(home, np.eye(6)[0])
+    motion = Motion.of_rows(np.repeat(Motion.from_pose(home).rows[None], 3, axis=0))
+    for ask in (lambda: c.speed_factor(motion, times=[0, 1, 2]),
+                lambda: c.amplitude_factor(motion, times=[0, 1, 2]),
+                lambda: c.payload(motion, [0, 0, 0], times=[0, 1, 2]),
+                lambda: c.clearance(home), lambda: c.section(home)):
+        with pytest.raises(ParameterError, match='available for telescopic legs alone'):
+            ask()
+    with pytest.raises(MotionError, match='all six numbers are zero'):
+        c.travel(home, np.zeros(6))

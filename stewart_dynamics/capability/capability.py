@@ -49,7 +49,8 @@ from stewart_dynamics.parameters.table import Parameters
 _ENDS = np.array(ENDS)
 # Bounds where a minimum is not given.
 _UNLIMITED = {limits.LENGTH_MIN: 0.0, limits.CLEARANCE_MIN: -math.inf}
-# Limits of a path, after those of drives; of those that are exceeded at one sample the first one is named.
+# Limits of a path, after those of drives; of those that are exceeded at one sample the first one
+# is named.
 _OF_PATHS = (limits.CLEARANCE_MIN, *limits.OF_JOINTS)
 _OTHER_ENDS = slice(-6, None)  # of legs, in ``load_rows``
 # Rounds in which the least tilt between two azimuths is found.

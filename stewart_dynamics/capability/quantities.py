@@ -74,10 +74,10 @@ def starts_at(parameters: Parameters, axes: Array, plates: Sequence[Array], rows
     centers = rows[:, None, POSITION] + pivots @ turn
     to_centers, arms = centers - parameters.geometry.base_joints, (joints - pivots) @ turn
     circles = parameters.leg_kind.anchor_circles(parameters)
-    lines = to_centers + arms if circles is None else parameters.leg_kind.lines(
-        parameters, rows[:, POSITION], rows[:, ROTATION].reshape(-1, 3, 3)).directions
     levers = joints @ turn / parameters.singularity.characteristic_length
     with np.errstate(all='ignore'):
+        lines = to_centers + arms if circles is None else parameters.leg_kind.lines(
+            parameters, rows[:, POSITION], rows[:, ROTATION].reshape(-1, 3, 3)).directions
         sides = np.linalg.det(np.concatenate([lines, np.cross(levers, lines)], axis=2))
     return Starts(to_centers, arms, levers, axes[6:] @ turn, plates[0] - centers,
                   (plates[1] - pivots) @ turn, sides, circles)
@@ -357,8 +357,9 @@ class Turns(Quantity):
 
     def margins(self, moved: Moved) -> Enclosure:
         """Return margins over cells, one for each leg."""
-        turned: Enclosure = moved.turned_circles[:, self._limited]
-        return (dot(turned, self._middles) - self._cosines) * self._scales
+        cosines = dot(moved.turned_circles[:, self._limited], self._middles)
+        found: Enclosure = (cosines - self._cosines) * self._scales
+        return found
 
     def values(self, moved: Moved) -> Array:
         """Return how far positions are below the upper limit (N, M), and above the lower one."""

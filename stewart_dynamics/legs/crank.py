@@ -74,6 +74,7 @@ class Crank(LegKind):
     likely = {'geometry.crank_branch': (AUTO,)}
     inertia_unit = 'kg m^2'
     friction_units = 'N m s/rad', 'N m'
+    bodies = {'crank': 'legs.crank.mass', 'rod': 'legs.rod.mass'}
     alternatives = (HEADINGS,), (AXES, DIRECTIONS)
     units = {'actuator.viscous_friction': 'N m s/rad', 'actuator.coulomb_friction': 'N m',
              'actuator.coulomb_velocity': 'rad/s'}
@@ -129,16 +130,16 @@ class Crank(LegKind):
         """
         legs: Any = parameters.structure['legs']
         low, high = parameters.limits.angle_min, parameters.limits.angle_max
-        both = low is not None and high is not None
-        middle = 0.5 * (low + high) if both else np.zeros(6)
+        middle = np.zeros(6) if low is None or high is None else 0.5 * (low + high)
         lowest = middle - math.pi if low is None else np.maximum(low, middle - math.pi)
         highest = middle + math.pi if high is None else np.minimum(high, middle + math.pi)
         half = 0.5 * (highest - lowest)
         below, above = self.position_limits
         u, z = crank_axes(parameters)
+        across = np.asarray(np.cross(u, z), dtype=float)
         return AnchorCircles(
-            z, np.cross(u, z), parameters['legs.crank.length'], parameters['legs.rod.length'],
-            legs['branch'].copy(), parameters.limits.lever_min, 0.5 * (lowest + highest),
+            z, across, parameters['legs.crank.length'], parameters['legs.rod.length'],
+            legs['branch'].copy(), parameters['limits.lever_min'], 0.5 * (lowest + highest),
             np.where(half < math.pi, half, math.inf),
             (below if high is None else above, above if low is None else below))
 

@@ -131,11 +131,17 @@ class LegKind(ABC):
     defaults: Mapping[str, Any] = {}  # the same
     inertia_unit: str  # of the reflected inertia of a drive
     friction_units: tuple[str, str]  # viscous and Coulomb
+    bodies: Mapping[str, str]  # of a leg, and the parameters of their masses
 
     @property
     def number(self) -> int:
         """Return ``stewart_platform.leg_kind``."""
         return KINDS[self.name.upper()]
+
+    @property
+    def stiffness_unit(self) -> str:
+        """Return the unit of the stiffness of a drive."""
+        return f'{self.effort.unit}/{self.position.unit}'
 
     @property
     def published(self) -> slice:

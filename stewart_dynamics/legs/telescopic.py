@@ -61,6 +61,7 @@ class Telescopic(LegKind):
     zero = 'geometry.zero_length'
     inertia_unit = 'kg'
     friction_units = 'N s/m', 'N'
+    bodies = {'cylinder': 'legs.cylinder.mass', 'piston': 'legs.piston.mass'}
 
     def write_fields(self, legs: Records, parameters: Parameters) -> None:
         """Write nothing: all fields hold parameters as they are."""

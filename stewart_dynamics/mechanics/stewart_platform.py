@@ -526,7 +526,8 @@ class StewartPlatform:
         pose : Pose or Motion
             Poses of any leading shape (...).
         leg_stiffness : float or (..., 6)
-            Stiffness of each leg along its axis [N/m]; one number is for all legs.
+            Stiffness of each leg along its axis [N/m], or of its drive where that turns
+            [N m/rad]; one number is for all legs.
 
         Returns
         -------
@@ -534,7 +535,7 @@ class StewartPlatform:
             ``J_q^T k J_q`` in [N/m], [N] and [N m/rad]; see ``mechanics.stiffness``.
 
         """
-        legs = stiffness.leg_stiffnesses(leg_stiffness)
+        legs = stiffness.leg_stiffnesses(leg_stiffness, self._kind.stiffness_unit)
         j_q = self.drive_jacobian(pose)
         shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
         with np.errstate(all='ignore'):
@@ -550,7 +551,7 @@ class StewartPlatform:
         ``parameters.replaced({'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
         'drive.screw_inertia': None})``.
         """
-        legs = stiffness.leg_stiffnesses(leg_stiffness)
+        legs = stiffness.leg_stiffnesses(leg_stiffness, self._kind.stiffness_unit)
         mass, j_q = self.mass_matrix(pose), self.drive_jacobian(pose)
         shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
         with np.errstate(all='ignore'):
