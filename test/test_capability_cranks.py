@@ -461,8 +461,51 @@ def test_what_limits_nothing_and_what_is_not_known() -> None:
     for ask in (lambda: c.speed_factor(motion, times=[0, 1, 2]),
                 lambda: c.amplitude_factor(motion, times=[0, 1, 2]),
                 lambda: c.payload(motion, [0, 0, 0], times=[0, 1, 2]),
-                lambda: c.clearance(home), lambda: c.section(home)):
+                lambda: c.clearance(home)):
         with pytest.raises(ParameterError, match='available for telescopic legs alone'):
             ask()
     with pytest.raises(MotionError, match='all six numbers are zero'):
         c.travel(home, np.zeros(6))
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_sections_agree_with_samples(seed: int) -> None:
+    random = rng(seed)
+    machine = random_machine(random, 0.0)
+    angles = StewartPlatform(parameters_of(machine)).inverse_kinematics(
+        Pose(machine.home, np.eye(3)))
+    # one of two to the ends of reach
+    p = parameters_of(machine, **{
+        'limits.angle_min': None if seed % 2 else angles - random.uniform(0.4, 1.2, 6),
+        'limits.angle_max': None if seed % 2 else angles + random.uniform(0.4, 1.2, 6),
+        'limits.lever_min': 0.0 if seed % 2 else 0.1})
+    pose = Pose(machine.home, rotation_about(random_direction(random), 0.05))
+    turned = np.tile(pose.rotation, (20000, 1, 1))
+    found = Capability(StewartPlatform(p)).section(pose, 'xyz'[seed % 3])
+    axes = [n for n in range(3) if n != seed % 3]
+    edges = np.concatenate([part.points for part in found.boundary])
+    low, high = edges.min(axis=0), edges.max(axis=0)
+    points = np.tile(pose.position, (2000, 1))
+    points[:, axes] = random.uniform(low - 0.1 * (high - low), high + 0.1 * (high - low),
+                                     (2000, 3))[:, axes]
+    inside = np.zeros(len(points), dtype=bool)
+    for loop in found.loops:
+        (x, y), (next_x, next_y) = loop[:-1, axes].T, loop[1:, axes].T
+        at = points[:, axes]
+        above = (y > at[:, 1:]) != (next_y > at[:, 1:])
+        with np.errstate(all='ignore'):
+            crossing = x + (at[:, 1:] - y) / (next_y - y) * (next_x - x)
+        inside ^= (above & (crossing > at[:, :1])).sum(axis=1) % 2 == 1
+    scan = scanned(machine, p, np.concatenate([pose.position[None], points]), turned[:2001])
+    good = np.max([each if each.ndim == 1 else each.max(axis=1) for each in scan], axis=0) <= 0.0
+    tips, longest = machine.center - machine.P @ pose.rotation.T, (
+        machine.crank + machine.rod)[:, None]
+    step = float(((tips + longest).min(axis=0) - (tips - longest).max(axis=0)).max()) / 128
+    away = np.array([np.linalg.norm(edges - each, axis=1).min() for each in points]) > 1.5 * step
+    assert np.count_nonzero(away & inside) > 100
+    assert (inside == good[1:])[away].all()
+    on = scanned(machine, p, np.concatenate([pose.position[None], edges]),
+                 turned[:len(edges) + 1])
+    assert max(float(each[1:].max()) for each in (on.angle_max, on.angle_min)) < 1e-6
+    assert float(on.lever_min[1:].max()) < 1e-6
+    assert {part.limit for part in found.boundary} <= set(Scan._fields)

@@ -314,7 +314,8 @@ class Capability:
 
         The curves on which lengths and joint angles end are exact; holes are holes. Boundaries at
         singularities and at the clearance of the legs, if there are any, are exact at points of a
-        grid of 128 x 128; parts that are thinner than one of its steps are missed.
+        grid of 128 x 128; parts that are thinner than one of its steps are missed. So are all
+        boundaries of legs whose lengths do not change, and whose anchors are moved.
 
         Parameters
         ----------
@@ -324,8 +325,7 @@ class Capability:
             Base axis normal to the plane: the platform's origin has the pose's coordinate there.
 
         """
-        require_kind(self.platform.parameters, 'sections of the workspace')
-        if limits.LENGTH_MAX not in self._limits.bounds:
+        if not (self._margins.circles or limits.LENGTH_MAX in self._limits.bounds):
             raise self._unlimited((limits.LENGTH_MAX,))
         if normal not in ('x', 'y', 'z'):
             raise wrong_type('normal', normal, "'x', 'y' or 'z'")

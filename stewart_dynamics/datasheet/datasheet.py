@@ -103,7 +103,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
         sheet['drives'] = drives
     progress.stage('workspace')
     sections = {name: hexapod.section(normal) for name, normal in zip(
-        workspace.PLANES, 'yxz', strict=True) if hexapod.limited('length_max')}
+        workspace.PLANES, 'yxz', strict=True) if hexapod.has_sections}
     modes = {} if order.leg_stiffness is None else {
         name: workspace.frequencies(hexapod, each, workspace.PLANES[name], order.leg_stiffness)
         for name, each in sections.items()}

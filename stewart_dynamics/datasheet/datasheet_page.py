@@ -122,6 +122,7 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         drive_heads=_drive_heads(sheet, hexapod, torque_unit),
         joints=_joints(sheet, hexapod, torque_unit),
         properties=_properties(sheet, hexapod, torque_unit), drive_unit=_drive_unit(hexapod),
+        position=hexapod.given.leg_kind.position.name,
         verdicts=[(name.capitalize(), found, words(found)) for name, words in (
             ('motion', motion_verdict), ('box', box_verdict)) if (found := sheet[name])],
         report=link_to_other(path, [
@@ -291,8 +292,9 @@ def _joints(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: str,
     p, unit, rows = hexapod.given, _position_unit(hexapod), []
     positions = hexapod.platform.inverse_kinematics(hexapod.pose)
     for n, name in enumerate(hexapod.joints):
-        cells = [number(unit.factor * float(positions[n]), 1), ' to '.join(
-            '–' if p[limit] is None else f'{unit.factor * p[limit][n]:.6g}'
+        shown = round(unit.factor * float(positions[n]), 1) + 0.0  # no -0
+        cells = [number(shown, 1), ' to '.join(
+            '–' if p[limit] is None else f'{unit.factor * p[limit][n]:.6g}'.replace('-', '−')
             for limit in p.leg_kind.position_limits)]
         if 'drives' in sheet:
             drives = sheet['drives']

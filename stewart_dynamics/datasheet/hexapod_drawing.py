@@ -159,8 +159,8 @@ class Drawing:
                 ) -> _Place:
         """Return the place of a view, at the largest scale at which some views fit."""
         points = np.concatenate([
-            self._base, *([] if self._anchors is None else [self._anchors]), self._base_plate, self._platform, self._pivot,
-            *map(self._moving_plate, self._poses)])
+            self._base, *([] if self._anchors is None else [self._anchors]), self._base_plate,
+            self._platform, self._pivot, *map(self._moving_plate, self._poses)])
         room = np.array([picture.width - margins.sides, picture.height - margins.top
                          - margins.bottom])
         spans = [np.ptp(each.of(points), axis=0) + _PLATE * self._size for each in views]

@@ -15,10 +15,10 @@ from stewart_dynamics.capability.capability import Capability, Extent
 from stewart_dynamics.capability.reachable import Reachable
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
+from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.dynamics.linear_parameters import with_point_mass
 from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
-from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.limits import limits_of
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import CONDITION
@@ -82,9 +82,11 @@ class RatedHexapod:
         names: tuple[str, ...] = self.given['joints']
         return names
 
-    def limited(self, name: str) -> bool:
-        """Return whether a limit is given."""
-        return self.given[f'limits.{name}'] is not None
+    @property
+    def has_sections(self) -> bool:
+        """Return whether sections of the workspace end on all sides."""
+        p = self.given
+        return p.limits.length_max is not None or p.leg_kind.anchor_circles(p) is not None
 
     def travel(self, poses: Pose, directions: Array) -> Extent:
         """Return ``Capability.travel`` from poses of the pivot."""

@@ -144,9 +144,9 @@ class Crank(LegKind):
             (below if high is None else above, above if low is None else below))
 
     def lever_ratios(self, parameters: Parameters, results: Array) -> Array:
-        """Return |k| / L1."""
+        """Return |k| / L1, or -1 where a rod does not reach."""
         ratios = np.abs(results[..., _LEVERS]) / parameters['legs.crank.length']
-        reached: Array = np.where(np.isfinite(ratios), ratios, 0.0)
+        reached: Array = np.where(np.isfinite(ratios), ratios, -1.0)
         return reached
 
     def leg_mass(self, parameters: Parameters, at: Lines) -> Array:

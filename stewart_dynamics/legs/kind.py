@@ -189,7 +189,7 @@ class LegKind(ABC):
         return None
 
     def lever_ratios(self, parameters: Parameters, results: Array) -> Array:
-        """Return levers by their largest values (..., 6); 0 where a leg does not reach."""
+        """Return levers by their largest values (..., 6); -1 where a leg does not reach."""
         del parameters
         return np.ones((*results.shape[:-1], 6))
 
