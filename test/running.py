@@ -58,9 +58,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, Header
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.executables import executable
+from stewart_dynamics.legs import TELESCOPIC
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 from stewart_dynamics.ros.rclpy_workarounds import shut_down, spin
+from stewart_dynamics.setpoints.output_messages import LegTopics
 from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 import yaml
@@ -85,9 +88,15 @@ INPUTS: dict[str, Any] = {
     'setpoint/combined': MultiDOFJointTrajectory, 'wrench': WrenchStamped}
 # Their stamps are those of the answers.
 FIRST = ('setpoint/pose', 'setpoint/combined')
-OUTPUTS: dict[str, Any] = {
-    'leg_states': JointState, 'leg_lengths': Float64MultiArray, 'leg_forces': Float64MultiArray,
-    'jacobian_determinant': Float64, 'singularity_warning': Bool}
+
+def outputs_of(kind: LegKind) -> dict[str, Any]:
+    """Return the topics of answers of hexapods with a kind of legs."""
+    return {'leg_states': JointState,
+            **dict.fromkeys(LegTopics.of(kind), Float64MultiArray),
+            'jacobian_determinant': Float64, 'singularity_warning': Bool}
+
+
+OUTPUTS: dict[str, Any] = outputs_of(TELESCOPIC)
 SERVICES: dict[str, Any] = {
     'change_state': ChangeState, 'get_state': GetState, 'describe_parameters': DescribeParameters,
     'get_parameters': GetParameters, 'set_parameters': SetParameters,
@@ -512,6 +521,8 @@ class DynamicsNode:
         self.asked: Counter[int] = Counter()  # setpoints that were sent, by their stamp
         self.fed: list[range] = []  # stamps that others may have sent, each once
         self.platform = StewartPlatform.from_yaml(process.file)
+        self.kind = self.platform.parameters.leg_kind
+        self.of_legs, self.outputs = LegTopics.of(self.kind), outputs_of(self.kind)
         self._statuses: dict[str, DiagnosticStatus] = {}
         self._reported: list[DiagnosticStatus] = []
         self.time = 0  # of the last diagnostics [ns]
@@ -530,7 +541,7 @@ class DynamicsNode:
                             for topic, kind in INPUTS.items()}
             self.raw = {topic: self.peer.listen(
                 f'{NODE}/{topic}', kind, LATCHED if topic == 'singularity_warning' else QOS)
-                for topic, kind in OUTPUTS.items()}
+                for topic, kind in self.outputs.items()}
             self.peer.node.create_subscription(
                 Log, '/rosout', lambda message: self._said.append(message.msg), LATCHED)
             self.peer.node.create_subscription(
@@ -618,7 +629,7 @@ class DynamicsNode:
     def received(self, topic: str) -> list[Any]:
         """Return the messages of an output topic so far."""
         decoded = self._decoded[topic]
-        decoded += [deserialize_message(raw, OUTPUTS[topic])
+        decoded += [deserialize_message(raw, self.outputs[topic])
                     for raw in self.raw[topic][len(decoded):]]
         return decoded
 
@@ -684,9 +695,10 @@ class DynamicsNode:
             found[:] = [state for state in self.received('leg_states')
                         if nanoseconds(state.header.stamp) == stamp]
             states = self.received('leg_states')
-            return bool(found) and len(self.raw['leg_lengths']) == len(
-                self.raw['jacobian_determinant']) == len(states) and len(
-                    self.raw['leg_forces']) == sum(len(state.effort) > 0 for state in states)
+            positions, efforts = (len(self.raw[topic]) for topic in self.of_legs)
+            return bool(found) and positions == len(
+                self.raw['jacobian_determinant']) == len(states) and (
+                    efforts == sum(len(state.effort) > 0 for state in states))
 
         self.until(answered, f'the setpoint with stamp {stamp} is answered')
         assert len(found) == 1
@@ -711,11 +723,13 @@ class DynamicsNode:
               platform: StewartPlatform | None = None) -> None:
         """Check leg states, all of their bits, against the library's numbers."""
         parameters = (platform or self.platform).parameters
-        bound = parameters['limits.force_max']
+        bound = parameters[self.kind.effort_limit]
+        positions, rates, efforts = (getattr(result, each.field) for each in (
+            self.kind.position, self.kind.rate, self.kind.effort))
         assert state.name == list(parameters['joints'])
-        assert bits(state.position) == bits(result.lengths - parameters['geometry.zero_length'])
-        assert bits(state.velocity) == bits(result.rates)
-        assert bits(state.effort) == bits(np.clip(result.forces, -bound, bound))
+        assert bits(state.position) == bits(positions - parameters['geometry.zero_length'])
+        assert bits(state.velocity) == bits(rates)
+        assert bits(state.effort) == bits(np.clip(efforts, -bound, bound))
 
     def rejects(self, topic: str, reason: str, number: int = 1) -> None:
         """Expect that the diagnostics count this number of further rejections."""
@@ -734,19 +748,20 @@ class DynamicsNode:
             raise AssertionError(
                 f'counted {self.counted()}, expected {self.expected}: {exc}') from exc
 
-    def at_work(self) -> None:
+    def at_work(self, sample: Sample = HOME) -> None:
         """
         Check that the node does its work, and has done nothing else so far.
 
         A setpoint is answered with the library's bits, rejections are counted as expected, and of
         all that has come out nothing is without a setpoint that asked for it.
         """
-        self.answer()
+        self.answer(sample)
         self.until_counted()
         states = self.received('leg_states')
-        self.until(lambda: len(self.raw['leg_forces']) >= sum(
-            len(state.effort) > 0 for state in states), 'all forces have come')
-        assert len(self.raw['leg_forces']) == sum(len(state.effort) > 0 for state in states)
+        efforts = self.raw[self.of_legs.efforts]
+        count = sum(len(state.effort) > 0 for state in states)
+        self.until(lambda: len(efforts) >= count, 'all efforts have come')
+        assert len(efforts) == count
         self.check_answers()
 
     # -- services --------------------------------------------------------------------------
@@ -857,13 +872,13 @@ class DynamicsNode:
         assert repeated.total() <= self.asked[0], repeated
         # Forces carry no stamp: each is that of an answer, in their order.
         efforts = [bits(state.effort) for state in states if len(state.effort)]
-        forces = [bits(each.data) for each in self.received('leg_forces')]
+        forces = [bits(each.data) for each in self.received(self.of_legs.efforts)]
         for n, (effort, force) in enumerate(zip(efforts, forces, strict=False)):
             assert effort == force, f'force {n} of {len(forces)}'
 
     def check_finite(self) -> None:
         """Check that no output had a number that is not finite."""
-        for topic in OUTPUTS:
+        for topic in self.outputs:
             for message in self.received(topic):
                 numbers = ([*message.position, *message.velocity, *message.effort]
                            if topic == 'leg_states' else np.atleast_1d(message.data))

@@ -373,7 +373,7 @@ def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None
     motions = HOME.motions.copy()
     motions[:, 2] *= -1.0
     below = outputs_of(HOME.replaced(motions))
-    assert below.lengths == pytest.approx(CLEAR.lengths, rel=1e-12)
+    assert below.drive_positions == pytest.approx(CLEAR.drive_positions, rel=1e-12)
     diagnostics = begun(**around)
     diagnostics.begins(motions[0].tolist(), float(below.determinants[0]))
     for n in range(2):
@@ -513,9 +513,9 @@ def test_held_limits_are_ok(snapshot: Snapshot) -> None:
     snapshot(of.message)
     values = dict(of.values)
     for leg, name in enumerate(PARAMETERS['joints']):
-        assert values[f'{name}: length (m)'] == f'{CLEAR.lengths[0, leg]:.6g}'
+        assert values[f'{name}: length (m)'] == f'{CLEAR.drive_positions[0, leg]:.6g}'
         assert values[f'{name}: rate (m/s)'] == f'{CLEAR.rates[0, leg]:.6g}'
-        assert values[f'{name}: force demanded (N)'] == f'{CLEAR.demanded_forces[0, leg]:.6g}'
+        assert values[f'{name}: force demanded (N)'] == f'{CLEAR.demanded_efforts[0, leg]:.6g}'
 
 
 @pytest.mark.parametrize('action', ['warn', 'suppress_forces'])
@@ -578,7 +578,7 @@ def test_each_kind_of_limit_is_logged_when_it_is_exceeded_and_when_no_longer(
 
 def test_the_largest_force_is_kept_until_the_next_activation() -> None:
     diagnostics = begun()
-    forces, = CLEAR.demanded_forces
+    forces, = CLEAR.demanded_efforts
     key, leg = 'largest force demanded since activation (N)', 'leg of the largest force demanded'
     for largest, at in ((1e4, 3), (-2.5e4, 5), (2e4, 0)):
         peak = (*forces[:at], largest, *forces[at + 1:])

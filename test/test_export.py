@@ -320,7 +320,7 @@ def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
             if np.isnan(results[n, FORCES]).all():
                 results[n, FORCES] = results[n, JOINT_FORCES] = 0.0
             code = (SINGULAR if output.conditions[0] >= UNSOLVABLE_CONDITION
-                    else OK if output.with_forces[0] else SUPPRESSED)
+                    else OK if output.with_efforts[0] else SUPPRESSED)
             warned, exceedances = output.singularity(), step.exceedances(output)
             exceeded = [0] * 6
             for each in exceedances:
@@ -531,9 +531,9 @@ def test_golden_csv_is_read_as_it_was_computed(exported: Path) -> None:
         numbers = [row[name] for name in names]
         output = step(Batch.of(int(row['stamp']), numbers[2:26], numbers[26:32],
                                bases=numbers[32:44] if row['has_base'] else None), state)
-        assert output.with_forces.tolist() == [True]
+        assert output.with_efforts.tolist() == [True]
         state = output.state
-        assert [row[f'force_{leg}'] for leg in range(1, 7)] == output.forces[0].tolist()
+        assert [row[f'force_{leg}'] for leg in range(1, 7)] == output.efforts[0].tolist()
         assert row['determinant'] == output.determinants[0]
     assert {row['has_base'] for row in rows} == {0.0, 1.0}
     assert any(row['exceeded_1'] for row in rows) and not rows[0]['exceeded_1']

@@ -168,7 +168,7 @@ def test_in_motion_it_is_the_residual_of_the_equation_of_motion() -> None:
             mass, jacobian = platform.mass_matrix(motion), platform.inverse_jacobian(motion)
             rest = platform.gravity_vector(motion) - known + np.einsum(
                 'nij,nj->ni', platform.coriolis_matrix(motion), twist)
-            forces = np.array([each.forces for each in data[1:]])
+            forces = np.array([each.efforts for each in data[1:]])
             left = sum(np.einsum('nij,nj->ni', mass[end], acceleration) + rest[end]
                        - np.einsum('nji,nj->ni', jacobian[end], forces)
                        for end in (slice(None, -1), slice(1, None)))
@@ -260,8 +260,8 @@ def test_the_estimate_is_that_of_a_momentum_observer() -> None:
     platform = StewartPlatform(frictionless)
     interval, many = 100_000, 10_000
     data, noise = noisy(frictionless, interval, many, 1e-4, 6)
-    touched = resting(frictionless, HOME, LOAD, [0])[0].forces
-    data = [each._replace(forces=touched) if 3000 <= n < 7000 else each
+    touched = resting(frictionless, HOME, LOAD, [0])[0].efforts
+    data = [each._replace(efforts=touched) if 3000 <= n < 7000 else each
             for n, each in enumerate(data)]
     mass, gravity = platform.mass_matrix(HOME), platform.gravity_vector(HOME)
     jacobian = platform.inverse_jacobian(HOME)
@@ -269,7 +269,7 @@ def test_the_estimate_is_that_of_a_momentum_observer() -> None:
     gain, dt = 2.0 * math.pi * 10.0, interval * 1e-9
     residual, integral, observed = np.zeros(6), np.zeros(6), []
     for n in range(1, many):
-        integral += dt * (jacobian.T @ data[n].forces - gravity + residual)
+        integral += dt * (jacobian.T @ data[n].efforts - gravity + residual)
         residual = gain * (momentum[n] - momentum[0] - integral)
         observed.append(residual)
     found = wrenches(estimates(ExternalWrench(frictionless), data))
@@ -387,13 +387,13 @@ def test_a_setpoint_beyond_a_singularity_that_is_not_followed_changes_nothing() 
 def test_lengths_of_no_pose_are_an_error(snapshot: Snapshot) -> None:
     at = resting(HEXAPOD, HOME, None, [BEGIN])[0]
     step = ExternalWrench(HEXAPOD)
-    for lengths in ((0.1, *at.lengths[1:]), (-1.0,) * 6, (1e300,) * 6):
+    for lengths in ((0.1, *at.positions[1:]), (-1.0,) * 6, (1e300,) * 6):
         with snapshot.raises((PoseError, SingularityError)):
-            step(at._replace(lengths=six(lengths)), None, NO_WRENCH, target_of(HOME))
+            step(at._replace(positions=six(lengths)), None, NO_WRENCH, target_of(HOME))
 
 
 @pytest.mark.parametrize('changed', [
-    {'rates': (1e308,) * 6}, {'forces': (1e308,) * 6}], ids=str)
+    {'rates': (1e308,) * 6}, {'efforts': (1e308,) * 6}], ids=str)
 def test_numbers_that_overflow_are_an_error(changed: dict[str, Any], snapshot: Snapshot) -> None:
     step = ExternalWrench(HEXAPOD)
     first, second = resting(HEXAPOD, HOME, None, [BEGIN, BEGIN + 1])
@@ -476,9 +476,9 @@ def with_noise(measurements: Sequence[Measurement], factor: float = 1.0, noise: 
     """Return measurements with efforts in another unit, and noise as the accuracy page has it."""
     random = rng(3)
     return [each._replace(
-        lengths=six(each.lengths + noise * 1e-5 * random.normal(size=6)),
+        positions=six(each.positions + noise * 1e-5 * random.normal(size=6)),
         rates=six(each.rates + noise * 1e-4 * random.normal(size=6)),
-        forces=six(factor * (each.forces + noise * 5.0 * random.normal(size=6))))
+        efforts=six(factor * (each.efforts + noise * 5.0 * random.normal(size=6))))
         for each in measurements]
 
 
@@ -550,7 +550,7 @@ def test_velocities_that_are_not_the_derivative_of_positions_give_no_wrench(
     change, words = WRONG_RATES[wrong]
     noise = 1.0 if rate > 50.0 else 0.0
     found = judged([each._replace(rates=six(change(
-        np.array(each.lengths) - ZERO_LENGTHS, np.array(each.rates)))) for each in moving(
+        np.array(each.positions) - ZERO_LENGTHS, np.array(each.rates)))) for each in moving(
             rate, noise)])
     last = found[-1]
     assert last.wrench is not None and last.published is None
@@ -570,11 +570,11 @@ def test_right_velocities_are_no_mistake(rate: float, noise: float) -> None:
     # those of encoders, quantized and differences of each other, and those of a filter
     late = max(1, round(0.01 * rate))
     steps = moving(rate)
-    lengths = np.round(np.array([each.lengths for each in steps]) / 1e-6) * 1e-6
+    lengths = np.round(np.array([each.positions for each in steps]) / 1e-6) * 1e-6
     rates = np.diff(lengths, axis=0, prepend=lengths[:1]) * rate
     for values in (rates, np.repeat(rates[:1], late, axis=0).tolist() + rates.tolist()):
         assert not any(each.mistake for each in judged([
-            each._replace(lengths=six(length), rates=six(value)) for each, length, value in zip(
+            each._replace(positions=six(length), rates=six(value)) for each, length, value in zip(
                 steps, lengths, values, strict=False)]))
 
 
@@ -625,7 +625,8 @@ ZERO_LENGTHS = HEXAPOD['geometry.zero_length']
 
 def message_of(at: Measurement, **options: Any) -> bytes:
     """Return the message of a measurement of HEXAPOD."""
-    return joint_state(at.stamp, JOINTS, at.lengths - ZERO_LENGTHS, at.rates, at.forces, **options)
+    return joint_state(
+        at.stamp, JOINTS, at.positions - ZERO_LENGTHS, at.rates, at.efforts, **options)
 
 
 class Followed:
@@ -656,7 +657,7 @@ class Followed:
 
 REST = resting(HEXAPOD, HOME, LOAD, range(BEGIN, BEGIN + 50 * MILLISECOND, MILLISECOND))
 EXPECTED = estimates(ExternalWrench(HEXAPOD), [
-    each._replace(lengths=six(each.lengths - ZERO_LENGTHS + ZERO_LENGTHS))
+    each._replace(positions=six(each.positions - ZERO_LENGTHS + ZERO_LENGTHS))
     for each in REST])
 
 
@@ -695,8 +696,8 @@ def test_padding_bytes_are_ignored() -> None:
 def changed(**fields: Any) -> Callable[[Measurement], bytes]:
     """Return what makes a message with other fields of a measurement."""
     def make(at: Measurement) -> bytes:
-        given = {'names': JOINTS, 'position': at.lengths - ZERO_LENGTHS, 'velocity': at.rates,
-                 'effort': at.forces, **fields}
+        given = {'names': JOINTS, 'position': at.positions - ZERO_LENGTHS, 'velocity': at.rates,
+                 'effort': at.efforts, **fields}
         return joint_state(at.stamp, **given)
     return make
 
@@ -734,7 +735,7 @@ def test_a_hexapod_that_is_singular_everywhere_is_rejected() -> None:
         'geometry.base_joints': (1.5 * HEXAPOD['geometry.platform_joints']).ravel()})
     followed = Followed(similar)
     lengths = StewartPlatform(similar).inverse_kinematics(Pose([0.0, 0.0, 1.1], np.eye(3)))
-    followed.rejects(message_of(REST[0]._replace(lengths=six(lengths))), SINGULAR, 'lengths [')
+    followed.rejects(message_of(REST[0]._replace(positions=six(lengths))), SINGULAR, 'lengths [')
 
 
 @given(st.binary(max_size=120), st.integers(0, 400), st.integers(0, 255))

@@ -143,9 +143,9 @@ def test_published_wrenches_have_the_librarys_bits(begin: Callable[..., Felt]) -
     random = rng(11)
     stamps = times(random, 300)
     motion = swing(np.subtract(stamps, BEGIN) * 1e-9)
-    data = [message_of(Measurement(each.stamp, six(each.lengths + 1e-5 * random.normal(size=6)),
+    data = [message_of(Measurement(each.stamp, six(each.positions + 1e-5 * random.normal(size=6)),
                                    six(each.rates + 1e-4 * random.normal(size=6)),
-                                   six(each.forces + 5.0 * random.normal(size=6))))
+                                   six(each.efforts + 5.0 * random.normal(size=6))))
             for each in measured(HEXAPOD, motion, LOAD, stamps)]
     expected = [OutputMessages(HEXAPOD).of_wrench(each.stamp, each.wrench)
                 for each in taken(data) if each.wrench is not None]
@@ -186,7 +186,7 @@ def test_names_in_another_order_after_the_hexapod_is_connected_again(felt: Felt)
     for at in resting(HEXAPOD, AT_HOME, LOAD, stamps):
         felt.publish(joint_state(at.stamp, names, *(
             [math.nan, *reversed(np.asarray(numbers).tolist())]
-            for numbers in (at.lengths - ZERO_LENGTHS, at.rates, at.forces))))
+            for numbers in (at.positions - ZERO_LENGTHS, at.rates, at.efforts))))
     felt.until_answered(stamps[-1])
     assert np.max(np.abs(values(felt.received()[-1:]) - LOAD)) < 1e-6
 
@@ -233,7 +233,7 @@ def test_efforts_of_the_opposite_sign_are_named_and_give_no_wrench(
     def rest(factor: float) -> None:
         felt.stamp += MILLISECOND
         at = resting(HEXAPOD, AT_HOME, NO_WRENCH, [felt.stamp])[0]
-        felt.publish(message_of(at._replace(forces=six(factor * np.array(at.forces)))))
+        felt.publish(message_of(at._replace(efforts=six(factor * np.array(at.efforts)))))
 
     def reported() -> bool:
         rest(-1.0)

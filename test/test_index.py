@@ -14,10 +14,13 @@ from typing import Any, TYPE_CHECKING
 
 import pytest
 
-from stewart_dynamics.replay.index import COLUMNS, row_of, write_fleet
+from stewart_dynamics.legs import TELESCOPIC
+from stewart_dynamics.replay.index import columns_of, row_of, write_fleet
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
+
+COLUMNS = columns_of(TELESCOPIC)
 
 HOSTILE = ['<img src=x onerror=alert(1)>', '</script><script>alert(2)</script>',
            '"><svg onload=alert(3)>', "'-alert(4)-'", 'javascript:alert(5)', '&lt;b&gt; &amp;',

@@ -5,6 +5,7 @@
 from pathlib import Path
 from typing import Any
 
+from legs_of_all_kinds import KINDS, random_hexapod
 import numpy as np
 import pytest
 from referees import Array, random_motion, random_parameters, rng, rotation_about, smooth_motion
@@ -163,3 +164,29 @@ def test_level_axes_are_the_principal_axes(flat: float) -> None:
         assert np.linalg.det(axes) > 0.0 and np.argmax(np.abs(axes[2])) == np.argmax(axes[2])
         if n % 2 and not flat:
             assert np.array_equal(axes[2], np.abs(turn[:, 2]))
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_one_sample_has_the_joints_of_many_and_drives_are_those_of_the_library(kind):
+    p, motions = random_hexapod(kind, 4, 20)
+    joints = TreeJoints(p)
+    rows = joints.positions(motions.position, motions.rotation)
+    assert rows.shape == (20, len(joints.names))
+    for motion, row in zip(motions, rows, strict=True):
+        assert joints.of_sample(motion.rows.tolist()) == pytest.approx(row, abs=1e-13)
+    drives = [joints.names.index(leg) for leg in p['joints']]
+    zero = p[p.leg_kind.zero] if p.leg_kind.zero else 0.0
+    assert rows[:, drives] + zero == pytest.approx(
+        StewartPlatform(p).inverse_kinematics(motions.pose), abs=1e-13)
+
+
+def test_a_crank_whose_rod_does_not_reach_points_to_its_platform_joint():
+    p = Parameters.from_yaml(PLATFORM.with_name('crank_platform.yaml'))
+    joints, far = TreeJoints(p), Pose([0.0, 0.0, 5.0], np.eye(3))
+    one = joints.of_sample(far.rows.tolist())
+    assert np.isfinite(one).all()
+    assert one == pytest.approx(joints.positions(far.position, far.rotation), abs=1e-13)
+    line = far.position + p['geometry.platform_joints'] - p['geometry.base_joints']
+    u, z = p['geometry.crank_axes'], p['geometry.crank_directions']
+    expected = np.arctan2(np.sum(line * np.cross(u, z), axis=1), np.sum(line * z, axis=1))
+    assert one[6::3] == pytest.approx(expected, abs=1e-12)

@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 import pyarrow.parquet
 import pytest
 from scipy.spatial.transform import Rotation
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.singularity_warning import CAUSE
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
-from stewart_dynamics.setpoints.step import (
-    Computed, FIRST, OUTPUT, Outputs, PUBLISHED_FORCES, WARNING_STATE)
-from test_output_bag import answered, base_wrenches_of, LEGS, turning
+from stewart_dynamics.setpoints.step import Computed, FIRST, OUTPUT, Outputs, WARNING_STATE
+from test_output_bag import answered, base_wrenches_of, LEGS, PARAMETERS, turning
 
 RESULTS = 27
+PUBLISHED = TELESCOPIC.published
 
 
 def motions_of(number: int) -> NDArray[np.float64]:
@@ -41,9 +42,9 @@ def motions_of(number: int) -> NDArray[np.float64]:
 def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
                stamps: NDArray[np.int64], warnings: NDArray[np.bool_]) -> Outputs:
     rows = np.zeros((len(stamps), OUTPUT))
-    rows[:, :RESULTS], rows[:, PUBLISHED_FORCES] = results, forces
+    rows[:, :RESULTS], rows[:, PUBLISHED] = results, forces
     rows[:, WARNING_STATE][:, CAUSE] = warnings
-    return Outputs(np.ones(len(stamps), dtype=bool), stamps, rows, Computed(False, False, False),
+    return Outputs(np.ones(len(stamps), dtype=bool), stamps, rows, Computed.of(PARAMETERS),
                    FIRST)
 
 
@@ -59,7 +60,8 @@ def read_csv(file: Path) -> tuple[list[str], list[list[str]]]:
 
 def check_tables(folder: Path, blocks: list[Outputs]) -> None:
     """Check that both tables give every number back to the bit."""
-    tables: list[Any] = [CsvTable(folder, LEGS), ParquetTable(folder, LEGS)]
+    tables: list[Any] = [
+        kind(folder, TELESCOPIC, LEGS) for kind in (CsvTable, ParquetTable)]
     for table in tables:
         for outputs in blocks:
             number = len(outputs.stamps)
@@ -76,9 +78,9 @@ def check_tables(folder: Path, blocks: list[Outputs]) -> None:
         quaternions = to_quaternion(motions[:, 3:12].reshape(-1, 3, 3))
         for n in range(number):
             row, same = rows[at], [column[at] for column in columns]
-            expected = [seconds[n], *motions[n, :3], *quaternions[n], *outputs.lengths[n],
-                        *outputs.rates[n], *outputs.forces[n],
-                        *outputs.demanded_forces[n], outputs.determinants[n],
+            expected = [seconds[n], *motions[n, :3], *quaternions[n], *outputs.drive_positions[n],
+                        *outputs.rates[n], *outputs.efforts[n],
+                        *outputs.demanded_efforts[n], outputs.determinants[n],
                         outputs.determinant_rates[n], outputs.conditions[n],
                         *base_wrenches_of(outputs)[n]]
             assert int(row[0]) == same[0] == outputs.stamps[n]
@@ -97,7 +99,7 @@ def check_tables(folder: Path, blocks: list[Outputs]) -> None:
 def test_the_tables_give_every_number_back(tmp_path: Path) -> None:
     outputs = turning(300)
     assert outputs.warnings.any()
-    assert np.isnan(outputs.forces).any()
+    assert np.isnan(outputs.efforts).any()
     check_tables(tmp_path, [outputs, turning(0), turning(1)])
 
 
@@ -134,7 +136,7 @@ def test_numbers_at_the_edges(tmp_path: Path) -> None:
 @pytest.mark.parametrize('table', [CsvTable, ParquetTable])
 def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> None:
     legs = ('größe', 'a "leg"', 'one, two', 'line\nbreak', ' ', "'=1+1'")
-    writer = table(tmp_path, legs)
+    writer = table(tmp_path, TELESCOPIC, legs)
     outputs = turning(2)
     writer.write(answered(outputs, outputs.stamps, motions_of(2)))
     writer.close()
@@ -148,7 +150,7 @@ def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> No
 
 
 def test_the_base_wrench_is_before_the_warning(tmp_path: Path) -> None:
-    CsvTable(tmp_path, LEGS).close()
+    CsvTable(tmp_path, TELESCOPIC, LEGS).close()
     head, _ = read_csv(tmp_path / 'legs.csv')
     assert head[-8:] == [
         'condition', 'base_force_x_n', 'base_force_y_n', 'base_force_z_n', 'base_moment_x_n_m',
@@ -156,7 +158,7 @@ def test_the_base_wrench_is_before_the_warning(tmp_path: Path) -> None:
 
 
 def test_no_column_name_is_a_formula(tmp_path: Path) -> None:
-    CsvTable(tmp_path, ('=1+1', '+a', '-b', '@c', '\td', 'e')).close()
+    CsvTable(tmp_path, TELESCOPIC, ('=1+1', '+a', '-b', '@c', '\td', 'e')).close()
     head, _ = read_csv(tmp_path / 'legs.csv')
     assert [name.removesuffix('_length_m') for name in head[9:15]] == [
         "'=1+1", "'+a", "'-b", "'@c", "'\td", 'e']
@@ -164,7 +166,7 @@ def test_no_column_name_is_a_formula(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('table', [CsvTable, ParquetTable])
 def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
-    writer = table(tmp_path, LEGS)
+    writer = table(tmp_path, TELESCOPIC, LEGS)
     outputs = turning(0)
     writer.write(answered(outputs, outputs.stamps, motions_of(0)))
     writer.close()
@@ -178,7 +180,7 @@ def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
 
 def test_parquet_is_written_in_groups_of_many_rows(tmp_path: Path) -> None:
     outputs = turning(1000)
-    table = ParquetTable(tmp_path, LEGS)
+    table = ParquetTable(tmp_path, TELESCOPIC, LEGS)
     for _ in range(100):
         table.write(answered(outputs, outputs.stamps, motions_of(1000)))
     table.close()

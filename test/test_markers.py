@@ -26,7 +26,7 @@ from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: 
 from stewart_dynamics.node import markers as module  # noqa: E402
 from stewart_dynamics.node.diagnostics.levels import ERROR, OK, WARN  # noqa: E402
 from stewart_dynamics.node.markers import Markers  # noqa: E402
-from stewart_dynamics.setpoints.step import Batch, PUBLISHED_FORCES, Step  # noqa: E402
+from stewart_dynamics.setpoints.step import Batch, Step  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ def written(writer: Markers, step: Step, to: Batch, forces: Any = None) -> bytes
     outputs = step(to)
     assert outputs.answered[0]
     if forces is not None:
-        outputs.rows[:, PUBLISHED_FORCES] = forces
+        outputs.rows[:, outputs.computed.commands] = forces
     return writer.write(to, outputs, step.exceedances(outputs))
 
 
@@ -303,9 +303,9 @@ def test_without_a_limit_the_largest_force_has_the_full_colour() -> None:
         np.mean([module.NO_LOAD, module.PUSH], axis=0)))
     assert _leg_colors(parameters, (0.0,) * 6) == [shade(module.NO_LOAD)] * 6
     outputs = Step(parameters)(HOME)
-    assert outputs.with_forces[0]
+    assert outputs.with_efforts[0]
     text = picture(parameters, HOME)['singularity', 0].text
-    assert f'saturated at {np.abs(outputs.forces).max():.4g} N' in text
+    assert f'saturated at {np.abs(outputs.efforts).max():.4g} N' in text
 
 
 def test_legs_without_forces_are_grey() -> None:

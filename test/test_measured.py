@@ -19,6 +19,7 @@ from referees import random_parameters, rng, size_of
 from snapshot import Snapshot
 
 from stewart_dynamics import Motion, ParameterError, Parameters, StewartPlatform
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary_text import _measured_lines, measured_headline
@@ -129,7 +130,7 @@ def test_the_external_wrench_is_the_load_missing_in_the_model(seed: int) -> None
         comparison, case, (case.setpoints.stamps, forces))
     assert np.array_equal(seconds, case.seconds)
     assert np.array_equal(measured, forces)
-    assert np.array_equal(computed, case.outputs.demanded_forces)
+    assert np.array_equal(computed, case.outputs.demanded_efforts)
     assert np.max(np.abs(wrench - load)) < 1e-9 * np.max(np.abs(forces))
     # by the library's matrix
     j_inv = StewartPlatform(case.parameters).inverse_jacobian(case.motion)
@@ -202,7 +203,7 @@ def test_the_headline_names_the_difference_and_the_leg_where_it_is_largest() -> 
     share = rms / np.sqrt(np.mean(measured ** 2))
     assert values['residual_rms_n'] == pytest.approx(rms, rel=1e-9)
     assert values['residual_share'] == pytest.approx(share, rel=1e-9)
-    assert measured_headline(values) == (
+    assert measured_headline(values, TELESCOPIC) == (
         f'measured and computed forces differ by {rms:.3g} N RMS, {100.0 * share:.3g} % of the '
         'measured force; most in leg_5, by 20 N')
 
@@ -261,7 +262,7 @@ def test_a_likely_mistake_in_the_efforts_is_named(factor: float, what: str, word
     found = values_of(case, factor * case.forces())
     assert found['likely_mistake']['what'] == what
     assert words in found['likely_mistake']['text']
-    assert words in measured_headline(found)
+    assert words in measured_headline(found, TELESCOPIC)
     # the load may be three times that of the file; of another unit there is no external wrench
     known = found['external_wrench']['force_z']['mean_n'] is not None
     assert known == found['external_wrench_given'] == (what == 'scale')
@@ -306,7 +307,7 @@ def test_loads_friction_and_a_wrong_mass_are_no_mistake_in_the_efforts(seed: int
     constant = np.concatenate([0.5 * weight * random.uniform(-1.0, 1.0, 3),
                                0.2 * size * weight * random.uniform(-1.0, 1.0, 3)])
     friction = 0.1 * weight / 6.0 * np.sign(np.diff(
-        case.outputs.lengths, axis=0, prepend=case.outputs.lengths[:1]))
+        case.outputs.drive_positions, axis=0, prepend=case.outputs.drive_positions[:1]))
     for measured in (
             case.forces(parameters=heavier), case.forces(parameters=lighter),
             case.forces(parameters=payload), case.forces(contact), case.forces(constant),
@@ -349,7 +350,8 @@ def test_a_contact_of_one_sample_has_one_time_in_the_summary() -> None:
     case = case_of(many=3000)
     load = np.zeros((3000, 6))
     load[[0, *range(1200, 1230)], 2] = -400.0
-    lines = _measured_lines({'headline': '', **values_of(case, case.forces(load))})
+    lines = _measured_lines(
+        {'headline': '', **values_of(case, case.forces(load))}, TELESCOPIC.effort)
     assert [line.partition(':')[0] for line in lines if line.startswith('contact')] == [
         'contact at t = 0.00 s', 'contact from t = 12.00 to 12.29 s']
 
@@ -424,7 +426,7 @@ def test_forces_are_interpolated_between_samples_and_never_extrapolated() -> Non
 
 def test_setpoints_without_computed_forces_are_not_compared() -> None:
     case = case_of()
-    case.outputs.demanded_forces[7:11] = np.nan
+    case.outputs.demanded_efforts[7:11] = np.nan
     comparison = Comparison(case.parameters)
     seconds, measured, computed, wrench = compared(
         comparison, case, (case.setpoints.stamps, np.ones((500, 6))))
@@ -446,7 +448,7 @@ def test_nothing_compared_gives_null() -> None:
     force = values['external_wrench']['force_x']
     assert force == dict.fromkeys(force)
     assert values['residual_rms_n'] is None and values['residual_share'] is None
-    assert measured_headline(values) == 'no setpoint could be compared'
+    assert measured_headline(values, TELESCOPIC) == 'no setpoint could be compared'
     assert values['contacts']['count'] == 0
 
 

@@ -113,7 +113,7 @@ def test_speed_and_temperature_follow_the_action_of_limits(action: str) -> None:
         limits = {each.limit for each in found}
         seen |= limits
         suppressed = action == 'suppress_forces' and bool(limits)
-        assert np.isnan(outputs.forces[n]).tolist() == [suppressed] * 6
+        assert np.isnan(outputs.efforts[n]).tolist() == [suppressed] * 6
         assert ('motor_torques' in written(OutputMessages(p), outputs, n)) != suppressed
     assert seen == {SPEED_MAX, TEMPERATURE_RISE_MAX}
 
@@ -122,7 +122,7 @@ def test_the_torque_follows_a_clipped_force_but_limits_see_the_demanded_one() ->
     p = HEXAPOD.replaced({**PUBLISHED, 'actuator.reflected_mass': None, 'limits.force_max': 100.0,
                           'drive.torque_max': 0.06})
     output, _, (exceedances,) = answers(p, Motion(np.array([[0.0, 0.0, 1.0]]), np.eye(3)[None]))
-    assert output.forces.tolist() == [[100.0] * 6]
+    assert output.efforts.tolist() == [[100.0] * 6]
     assert output.motors[0, COMMANDS] == pytest.approx([100.0 / 3769.911184] * 6)
     assert {each.limit for each in exceedances} == {'limits.force_max', TORQUE_MAX}
     assert exceedances[6].words(p['joints']).startswith('leg_1: motor torque 0.06')
@@ -162,7 +162,7 @@ def test_without_forces_there_are_angles_and_speeds_alone() -> None:
     p = HEXAPOD.replaced({**PUBLISHED, 'actuator.reflected_mass': None})
     quarter = Motion.from_euler([[0.0, 0.0, 1.0]], [[0.0, 0.0, np.pi / 2]])
     output = answered(Step(p), Batch.of(STAMP, quarter.rows))
-    assert np.isnan(output.forces).all()
+    assert np.isnan(output.efforts).all()
     assert np.isnan(output.motors[:, BREAKAWAY_TORQUES]).all()
     messages = written(OutputMessages(p), output)
     assert 'motor_torques' not in messages

@@ -26,16 +26,18 @@ from rosbags.highlevel import AnyReader
 from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.replay.output_bag import OutputBag, RecordedModel
 from stewart_dynamics.replay.summary import Answered
-from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES, OutputMessages
+from stewart_dynamics.setpoints.output_messages import output_types, OutputMessages
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 import yaml  # type: ignore[import-untyped]
 
 PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced(
     {'singularity.action': 'suppress_forces'})
+OUTPUT_TYPES = output_types(TELESCOPIC)
 LEGS: tuple[str, ...] = tuple(PARAMETERS['joints'])
 STEP = Step(PARAMETERS)
 NODE = '/a_node'
@@ -83,7 +85,7 @@ def write_bag(folder: Path, blocks: Iterable[tuple[NDArray[np.int64], Outputs]])
 def turned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outputs]:
     """Return a bag of three chunks, and the outputs in it."""
     outputs = turning(300)
-    assert 5 < np.isnan(outputs.forces[:, 0]).sum() < 50
+    assert 5 < np.isnan(outputs.efforts[:, 0]).sum() < 50
     parts = [part_of(outputs, slice(at, at + 100)) for at in (0, 100, 200)]
     return write_bag(tmp_path_factory.mktemp('turned') / 'a bag', [
         (times_of(100, 100 * n), part) for n, part in enumerate(parts)]), outputs
@@ -95,19 +97,19 @@ def file_of(bag: Path) -> Path:
 
 def check_message(topic: str, message: Any, outputs: Outputs, n: int) -> None:
     """Check a message of the n-th output, as either reader gives it."""
-    stopped = bool(np.isnan(outputs.forces[n, 0]))
+    stopped = bool(np.isnan(outputs.efforts[n, 0]))
     if topic == 'leg_states':
         stamp = message.header.stamp
         assert stamp.sec * 1_000_000_000 + stamp.nanosec == outputs.stamps[n]
         assert tuple(message.name) == LEGS
         assert np.array_equal(
-            message.position, outputs.lengths[n] - PARAMETERS['geometry.zero_length'])
+            message.position, outputs.drive_positions[n] - PARAMETERS['geometry.zero_length'])
         assert np.array_equal(message.velocity, outputs.rates[n])
-        assert np.array_equal(message.effort, [] if stopped else outputs.forces[n])
+        assert np.array_equal(message.effort, [] if stopped else outputs.efforts[n])
     elif topic == 'leg_lengths':
-        assert np.array_equal(message.data, outputs.lengths[n])
+        assert np.array_equal(message.data, outputs.drive_positions[n])
     elif topic == 'leg_forces':
-        assert np.array_equal(message.data, outputs.forces[n])
+        assert np.array_equal(message.data, outputs.efforts[n])
     elif topic == 'jacobian_determinant':
         assert message.data == outputs.determinants[n]
     elif topic == 'base_wrench':
@@ -122,7 +124,7 @@ def check_message(topic: str, message: Any, outputs: Outputs, n: int) -> None:
 
 
 def expected_of(outputs: Outputs) -> dict[str, int]:
-    forces = int(np.isfinite(outputs.forces[:, 0]).sum())
+    forces = int(np.isfinite(outputs.efforts[:, 0]).sum())
     many = len(outputs.stamps)
     return {'leg_states': many, 'leg_lengths': many, 'leg_forces': forces,
             'jacobian_determinant': many, 'singularity_warning': int(outputs.changed.sum()),

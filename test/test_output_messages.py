@@ -14,14 +14,16 @@ from messages import STORE
 import numpy as np
 import pytest
 from stewart_dynamics.arrays import NO_WRENCH, Six
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
-from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES, OutputMessages
+from stewart_dynamics.setpoints.output_messages import output_types, OutputMessages
 from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs, Step
 from test_step import (
     answered, FLAT, PARAMETERS, QUARTER, random_setpoints, REST, rotations, singles, sizes, STAMP,
     STEP, UPRIGHT)
 
+OUTPUT_TYPES = output_types(TELESCOPIC)
 MESSAGES = OutputMessages(PARAMETERS)
 
 
@@ -70,11 +72,11 @@ def test_messages_carry_the_output() -> None:
         assert state.header.stamp.sec * 10 ** 9 + state.header.stamp.nanosec == setpoint.stamps[0]
         assert state.header.frame_id == ''
         assert tuple(state.name) == parameters['joints']
-        assert np.array_equal(state.position, output.lengths[0] - zero)
+        assert np.array_equal(state.position, output.drive_positions[0] - zero)
         assert np.array_equal(state.velocity, output.rates[0])
-        assert np.array_equal(state.effort, output.forces[0])
-        assert np.array_equal(of['leg_lengths'].data, output.lengths[0])
-        assert np.array_equal(of['leg_forces'].data, output.forces[0])
+        assert np.array_equal(state.effort, output.efforts[0])
+        assert np.array_equal(of['leg_lengths'].data, output.drive_positions[0])
+        assert np.array_equal(of['leg_forces'].data, output.efforts[0])
         assert of['jacobian_determinant'].data == output.determinants[0]
         assert of['singularity_warning'].data == output.warnings[0]
 
@@ -121,7 +123,7 @@ def test_many_messages_are_those_of_one_after_the_other(action: str) -> None:
         output = answered(step, setpoint, state)
         state = output.state
         assert written(by, outputs, n) == written(by, output)
-    assert 0 < np.count_nonzero(outputs.with_forces) < len(angles)
+    assert 0 < np.count_nonzero(outputs.with_efforts) < len(angles)
 
 
 def test_an_external_wrench_is_written_in_the_base_frame() -> None:

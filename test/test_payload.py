@@ -208,7 +208,7 @@ def test_noise_in_the_rates_makes_no_inertia_smaller() -> None:
 
 def test_only_mass_and_horizontal_center_are_identified_at_rest() -> None:
     outcome = outcome_of(recorded(at_rest))
-    payload, diagnostics = outcome.payload, PayloadDiagnostics()
+    payload, diagnostics = outcome.payload, PayloadDiagnostics(HEXAPOD)
     assert payload is not None
     assert known(payload) == ['mass', 'center of mass x', 'center of mass y']
     body, given = payload.fitted.body, payload.given

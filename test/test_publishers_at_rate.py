@@ -123,7 +123,7 @@ def test_joint_states_of_measured_legs(fresh: Start) -> None:
         joints.check(state, sent[stamp_of(state)])
     # Lengths that no pose has: reported, and nothing is published.
     wrong = resting(HEXAPOD, motion, LOAD, [stamp + MILLISECOND])[0]
-    felt.publish(message_of(wrong._replace(lengths=(0.2, 3.0, 0.2, 3.0, 0.2, 3.0))))
+    felt.publish(message_of(wrong._replace(positions=(0.2, 3.0, 0.2, 3.0, 0.2, 3.0))))
     node.until_said('measured_legs rejected: forward kinematics did not converge')
     for _ in range(20):
         node.answer()

@@ -118,8 +118,8 @@ class Model:
         assert np.abs(lack).max() < 1e-13
         return q
 
-    def torques(self, motion: Motion) -> tuple[Array, Array]:
-        """Return angles and torques (6,): the tree's, and virtual work."""
+    def drives_of(self, motion: Motion) -> tuple[Array, Array]:
+        """Return angles and torques (6,) of the drives: those of the tree, and virtual work."""
         model, data = self.model, self.data
         q = self.closed(motion)
         rows, arm = self._jacobians(q)
@@ -158,7 +158,7 @@ def test_torques_of_their_urdf_are_those_of_pinocchio(as_lines, tolerances, movi
     model.place_platform(p['geometry.platform_joints'])
     for motion in random_motions(20, moving):
         found = platform.inverse_dynamics(motion)
-        angles, torques = model.torques(motion)
+        angles, torques = model.drives_of(motion)
         assert np.abs(found.angles - angles).max() < 1e-12
         assert np.abs(found.torques - torques).max() < (
             tolerances[moving] * np.abs(torques).max())

@@ -39,6 +39,7 @@ from snapshot import Snapshot
 import stewart_dynamics
 from stewart_dynamics import BagError, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.model import JOINT_STATES, TF
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.frames.motion import motion_rows
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
@@ -52,13 +53,14 @@ from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.setpoints.input_messages import (
     ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
-from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
+from stewart_dynamics.setpoints.output_messages import output_types
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
 from test_recording import write_ros_1
 
 PROGRAM = 'stewart_replay'
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
+OUTPUT_TYPES = output_types(TELESCOPIC)
 PARAMETERS = Parameters.from_yaml(PARAMS)
 PLATFORM = StewartPlatform(PARAMETERS)
 BAGS = ('clear', 'singular', 'flawed')

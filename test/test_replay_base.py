@@ -121,7 +121,7 @@ def test_a_replay_gives_the_bits_of_the_step_and_states_where_the_base_is_not_kn
     outputs = replayed(of, parameters, tmp_path)
     expected = answers(parameters, of)
     unknown = [n for n, (_, answer) in enumerate(expected)
-               if np.isnan(answer.demanded_forces).all()]
+               if np.isnan(answer.demanded_efforts).all()]
     assert len(expected) == 300
     assert unknown[:5] == [0, 1, 2, 3, 4]
     assert 30 < len(unknown) < 60
@@ -132,7 +132,7 @@ def test_a_replay_gives_the_bits_of_the_step_and_states_where_the_base_is_not_kn
               for _, state in outputs.messages[f'{NODE}/leg_states']}
     for n, (setpoint, answer) in enumerate(expected):
         row, stamp = outputs.rows[n], int(setpoint.stamps[0])
-        base_wrench, demanded = load(setpoint)[0].tolist(), answer.demanded_forces[0].tolist()
+        base_wrench, demanded = load(setpoint)[0].tolist(), answer.demanded_efforts[0].tolist()
         cells = [row[f'{leg}_demanded_force_n'] for leg in parameters['joints']]
         of_base = [row[f'base_{part}'] for part in (
             'force_x_n', 'force_y_n', 'force_z_n', 'moment_x_n_m', 'moment_y_n_m',

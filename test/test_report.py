@@ -26,6 +26,7 @@ from snapshot import Snapshot
 
 from stewart_dynamics import Motion, Parameters, StewartError, StewartPlatform
 from stewart_dynamics.colors import LEG_COLORS, ROLES
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.rows import BASE, NO_BASE
@@ -132,7 +133,7 @@ class _Elements(HTMLParser):
 def write_measured(given: Given, path: Path, pushed: slice = slice(200, 260)) -> None:
     """Write the report of a motion whose measured forces differ, and for a while by far."""
     report, comparison = given.report(measured=True), Comparison(PARAMETERS)
-    forces = given.outputs.demanded_forces
+    forces = given.outputs.demanded_efforts
     measured = forces + np.random.default_rng(1).normal(size=forces.shape)
     measured[pushed] += 300.0
     for compared in (
@@ -142,7 +143,7 @@ def write_measured(given: Given, path: Path, pushed: slice = slice(200, 260)) ->
         report.add_measured(*compared)
     values = comparison.values()
     report.write(path, given.summary(measured={
-        'headline': measured_headline(values), **values}))
+        'headline': measured_headline(values, TELESCOPIC), **values}))
 
 
 def text_of(path: Path) -> str:
@@ -194,9 +195,9 @@ def test_plots_contain_the_samples_and_every_peak(tmp_path: Path) -> None:
                'angular_velocity': np.degrees(given.motions[:, 15:18]),
                'acceleration': given.motions[:, 18:21],
                'angular_acceleration': np.degrees(given.motions[:, 21:24]),
-               'length': given.outputs.lengths, 'rate': given.outputs.rates,
-               'force': given.outputs.demanded_forces,
-               'powers': given.outputs.demanded_forces * given.outputs.rates,
+               'length': given.outputs.drive_positions, 'rate': given.outputs.rates,
+               'force': given.outputs.demanded_efforts,
+               'powers': given.outputs.demanded_efforts * given.outputs.rates,
                'determinant': given.outputs.determinants[:, None],
                'condition': given.outputs.conditions[:, None],
                'base_force': given.base_wrenches[:, :3],
@@ -515,7 +516,7 @@ def test_the_slider_moves_platform_colors_and_cursor(opened: Callable[..., Opene
         report.until(f'player.frame === {sample} && !player.busy')
         np.testing.assert_allclose(joints_shown(report), joints_of(given, sample), atol=1e-12)
         colors = report.page.evaluate("document.getElementById('platform').data[5].line.color")
-        np.testing.assert_allclose(colors[::3], given.outputs.demanded_forces[sample])
+        np.testing.assert_allclose(colors[::3], given.outputs.demanded_efforts[sample])
         report.see('plot_force')
         report.until("document.querySelector('#plot_force .cursor').style.display === 'block'")
         place = report.page.evaluate(
@@ -527,7 +528,7 @@ def test_the_slider_moves_platform_colors_and_cursor(opened: Callable[..., Opene
         shown = report.page.locator('.plot:has(#plot_force) .readout td').all_inner_texts()
         np.testing.assert_allclose(
             [float(text.replace('−', '-').replace('\u202f', '')) for text in shown],
-            given.outputs.demanded_forces[sample], rtol=1e-4)
+            given.outputs.demanded_efforts[sample], rtol=1e-4)
 
 
 def test_playing_runs_to_the_end_of_the_motion(opened: Callable[..., Opened]) -> None:
@@ -572,7 +573,7 @@ def test_a_spike_does_not_set_the_scale_and_the_full_range_can_be_shown(
     report = opened(given)
     report.see('plot_force')
     extent = "document.getElementById('plot_force')._fullLayout.yaxis.range"
-    most = float(np.abs(given.outputs.demanded_forces).max())
+    most = float(np.abs(given.outputs.demanded_efforts).max())
     low, high = report.page.evaluate(extent)
     assert 6000.0 < max(-low, high) < 0.05 * most
     report.page.locator('.plot:has(#plot_force) .tools button').click()
@@ -690,7 +691,7 @@ def test_the_leg_can_be_selected_and_a_curve_hidden(opened: Callable[..., Opened
     plot = report.page.locator('.plot:has(#plot_force_breakdown)')
     plot.locator('select').select_option(label='leg_4')
     first = "document.getElementById('plot_force_breakdown').data[0].y[0]"
-    report.until(f'{first} === {float(np.float32(given.outputs.demanded_forces[0, 3]))!r}')
+    report.until(f'{first} === {float(np.float32(given.outputs.demanded_efforts[0, 3]))!r}')
     plot.locator('.readout button').nth(1).click()
     report.until("document.getElementById('plot_force_breakdown').data[1].visible === false")
 
@@ -752,7 +753,7 @@ def test_poses_that_cannot_be_solved_leave_gaps(opened: Callable[..., Opened]) -
     motions[300:400] = 0.0
     motions[300:400, 3:12] = np.eye(3).ravel()
     given = Given(whole.seconds, motions)
-    assert np.isnan(given.outputs.demanded_forces[300:400]).all()
+    assert np.isnan(given.outputs.demanded_efforts[300:400]).all()
     report = opened(given)
     report.see_everything()
     report.page.locator('#slider').fill('3.5')

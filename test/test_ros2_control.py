@@ -215,7 +215,7 @@ def assert_steps(program: Path, p: Parameters, random: np.random.Generator, coun
     outputs = Step(p)(Batch.of(stamps, motions, wrenches))
     expected = outputs.records.copy()
     # Without forces: those of C are zero, those of Python nan.
-    unknown = ~outputs.with_forces
+    unknown = ~outputs.with_efforts
     expected['forces'][unknown] = expected['motors']['commands'][unknown] = 0.0
     assert outputs.solvable.all()
     for name in OUTPUT_FIELDS:

@@ -94,10 +94,10 @@ def test_the_step_gives_the_librarys_bits() -> None:
             result = platform.inverse_dynamics(
                 Motion.of_rows(setpoint.motions[0]), setpoint.wrenches[0])
             output = answered(step, setpoint)
-            assert np.array_equal(output.lengths[0], result.lengths)
+            assert np.array_equal(output.drive_positions[0], result.lengths)
             assert np.array_equal(output.rates[0], result.rates)
-            assert np.array_equal(output.demanded_forces[0], result.forces)
-            assert np.array_equal(output.forces[0], result.forces)
+            assert np.array_equal(output.demanded_efforts[0], result.forces)
+            assert np.array_equal(output.efforts[0], result.forces)
             assert np.array_equal(output.unit_load_forces[0], result.unit_load_forces)
             assert output.determinants[0] == result.determinant
             assert output.determinant_rates[0] == result.determinant_rate
@@ -122,13 +122,13 @@ def test_the_step_keeps_no_state() -> None:
 def test_forces_are_clipped_and_reported() -> None:
     for setpoint in singles(random_setpoints(PARAMETERS, 20)):
         free = answered(STEP, setpoint)
-        forces = free.demanded_forces[0].tolist()
+        forces = free.demanded_efforts[0].tolist()
         assert not STEP.exceedances(free)
         bounds = [abs(force) * (0.5 if leg % 2 else 1.0) for leg, force in enumerate(forces)]
         step = Step(PARAMETERS.replaced({'limits.force_max': bounds}))
         output = answered(step, setpoint)
-        assert output.demanded_forces[0].tolist() == forces
-        assert output.forces[0].tolist() == [
+        assert output.demanded_efforts[0].tolist() == forces
+        assert output.efforts[0].tolist() == [
             force / 2 if leg % 2 else force for leg, force in enumerate(forces)]
         assert step.exceedances(output) == tuple(
             Exceedance('limits.force_max', leg, forces[leg], bounds[leg]) for leg in (1, 3, 5))
@@ -174,7 +174,7 @@ def both_ways(step: Step, setpoints: Sequence[Batch]) -> Outputs:
 def test_forces_are_suppressed_while_a_limit_of_motion_is_exceeded(
         limit: str, values: tuple[float, float]) -> None:
     moving = HOME.replaced(motions=(*HOME.motions[0, :14], 0.1, *REST[3:]))
-    leg = answered(STEP, moving).lengths.max()
+    leg = answered(STEP, moving).drive_positions.max()
     exceeded, held = (value * leg if 'length' in limit else value for value in values)
     tilted = moving.replaced(motions=(0.05, *moving.motions[0, 1:]))
     for bound, suppressed in ((exceeded, True), (held, False)):
@@ -184,16 +184,16 @@ def test_forces_are_suppressed_while_a_limit_of_motion_is_exceeded(
                 **dict.fromkeys(LEG_SHAPE, 0.01)}))
             output = both_ways(step, [tilted])
             assert output.exceeding[0] == suppressed
-            assert np.isnan(output.forces[0]).tolist() == [
+            assert np.isnan(output.efforts[0]).tolist() == [
                 suppressed and action == 'suppress_forces'] * 6
-            assert np.isfinite(output.demanded_forces).all()
+            assert np.isfinite(output.demanded_efforts).all()
 
 
 def test_a_force_that_is_clipped_suppresses_nothing() -> None:
     step = Step(PARAMETERS.replaced({'limits.force_max': 1.0, 'limits.action': 'suppress_forces'}))
     output = both_ways(step, [HOME])
     assert output.exceeding[0]
-    assert output.forces[0] == pytest.approx([1.0] * 6)
+    assert output.efforts[0] == pytest.approx([1.0] * 6)
 
 
 @pytest.mark.parametrize('action', ['warn', 'suppress_forces'])
@@ -203,10 +203,10 @@ def test_a_setpoint_that_the_legs_cannot_reach_in_time_is_a_jump(action: str) ->
     setpoints = [at(1.0, 0), at(1.0005, 1), at(1.1, 2), at(1.001, 3), at(1.0, 4)]
     outputs = both_ways(step, setpoints)
     assert outputs.jumped.tolist() == [False, False, True, False, False]
-    assert outputs.with_forces.tolist() == [True, True, action == 'warn', True, True]
-    assert (np.isnan(outputs.forces).T == ~outputs.with_forces).all()
+    assert outputs.with_efforts.tolist() == [True, True, action == 'warn', True, True]
+    assert (np.isnan(outputs.efforts).T == ~outputs.with_efforts).all()
     worst = step.exceedances(outputs, 2)[0]
-    lengths = outputs.lengths[:, worst.leg]
+    lengths = outputs.drive_positions[:, worst.leg]
     assert worst.value == pytest.approx((lengths[2] - lengths[1]) / (1e-3 + CONSTANTS['JITTER']))
     assert worst.bound == RATE
     assert 'limits.velocity_max' in worst.words(PARAMETERS['joints'])
@@ -214,7 +214,7 @@ def test_a_setpoint_that_the_legs_cannot_reach_in_time_is_a_jump(action: str) ->
 
 def test_after_a_jump_setpoints_are_followed_once_the_legs_can_be_there() -> None:
     step = Step(PARAMETERS.replaced({'limits.velocity_max': RATE}))
-    start, end = (answered(STEP, at(height, 0)).lengths.max() for height in (1.0, 1.1))
+    start, end = (answered(STEP, at(height, 0)).drive_positions.max() for height in (1.0, 1.1))
     needed = 1e3 * (end - start) / RATE
     times = np.arange(1, 300, 10)
     outputs = both_ways(step, [at(1.0, 0), *(at(1.1, time) for time in times.tolist())])
@@ -237,7 +237,7 @@ def test_a_motion_at_the_rate_limit_is_no_jump() -> None:
     heights = 1.0 + 0.1 * np.sin(2e-3 * math.pi * times)
     setpoints = [at(*each) for each in zip(heights.tolist(), times.tolist(), strict=True)]
     free = answered(STEP, Batch.joined(setpoints))
-    fastest = np.abs(np.diff(free.lengths, axis=0)).max() / 7e-3
+    fastest = np.abs(np.diff(free.drive_positions, axis=0)).max() / 7e-3
     step = Step(PARAMETERS.replaced({'limits.velocity_max': fastest}))
     assert not both_ways(step, setpoints[:20]).jumped.any()
 
@@ -256,15 +256,15 @@ def test_forces_are_suppressed_inside_the_stop_condition(action: str) -> None:
         'singularity.action': action, 'singularity.stop_condition': 100.0})
     step = Step(parameters)
     clear = answered(step, _turned(45.0))
-    assert np.array_equal(clear.forces, clear.demanded_forces)
+    assert np.array_equal(clear.efforts, clear.demanded_efforts)
     near = answered(step, _turned(89.9))
     assert 100.0 < near.conditions[0] < UNSOLVABLE_CONDITION
-    assert np.isfinite(near.demanded_forces).all()
+    assert np.isfinite(near.demanded_efforts).all()
     assert near.singularity().stopped
     if action == 'warn':
-        assert np.array_equal(near.forces, near.demanded_forces)
+        assert np.array_equal(near.efforts, near.demanded_efforts)
     else:
-        assert np.isnan(near.forces).all() and not near.with_forces[0]
+        assert np.isnan(near.efforts).all() and not near.with_efforts[0]
     assert near.warnings[0]
 
 
@@ -273,7 +273,7 @@ def test_a_suppressed_force_above_its_limit_is_still_reported() -> None:
         'singularity.action': 'suppress_forces', 'limits.force_max': 1.0}))
     setpoint = _turned(89.99)
     output = answered(step, setpoint)
-    assert np.isnan(output.forces).all()
+    assert np.isnan(output.efforts).all()
     assert {each.limit for each in step.exceedances(output)} == {
         'limits.force_max'}
 
@@ -286,14 +286,14 @@ def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Batc
     step = Step(PARAMETERS.replaced({'limits.force_max': 1.0}))
     output = answered(step, setpoint)
     assert output.conditions[0] >= UNSOLVABLE_CONDITION
-    assert np.isnan(output.demanded_forces).all()
-    assert np.isnan(output.forces).all()
+    assert np.isnan(output.demanded_efforts).all()
+    assert np.isnan(output.efforts).all()
     assert not step.exceedances(output)
     assert output.warnings[0]
     rotation = np.reshape(setpoint.motions[0, 3:12], (3, 3))
     legs = (setpoint.motions[0, :3] + PARAMETERS['geometry.platform_joints'] @ rotation.T
             - PARAMETERS['geometry.base_joints'])
-    assert np.allclose(output.lengths[0], np.linalg.norm(legs, axis=1), rtol=1e-14)
+    assert np.allclose(output.drive_positions[0], np.linalg.norm(legs, axis=1), rtol=1e-14)
 
 
 # Numbers that overflow

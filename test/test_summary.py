@@ -24,8 +24,9 @@ from referees import rng, ROOT, symmetric_parameters
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.core.binding import places
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
-from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE, RESULT
+from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, TIME, UNSOLVABLE_CONDITION
 from stewart_dynamics.replay.residuals import AXES
 from stewart_dynamics.replay.statements import cards
@@ -34,13 +35,14 @@ from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.reporting.block_statistics import LISTED
 from stewart_dynamics.setpoints.rejections import NOT_JOINED
 from stewart_dynamics.setpoints.step import (
-    Batch, Computed, FIRST, OUTPUT, Outputs, PUBLISHED_FORCES, WARNING_STATE)
+    Batch, Computed, FIRST, OUTPUT, Outputs, WARNING_STATE)
 from stewart_dynamics.whole_file import to_json
 
 Array = NDArray[np.float64]
 
 SECOND = 1_000_000_000
 RESTART, CLEARANCES = (places('stewart_output')[name] for name in ('restart', 'clearances'))
+PUBLISHED = TELESCOPIC.published
 JOINT_ANGLES = slice(CLEARANCES.start - 12, CLEARANCES.start)
 LIMITS = {
     'limits.length_min': [0.5, 0.6, 0.7, 0.5, 0.6, 0.0],
@@ -96,16 +98,16 @@ class Samples:
         many = len(self.seconds)
         limited = parameters['limits.leg_clearance_min'] is not None
         rows = np.zeros((many, OUTPUT))
-        rows[:, :RESULT] = np.concatenate([
+        rows[:, :TELESCOPIC.width] = np.concatenate([
             self.lengths, self.rates, self.demanded, self.det[:, None],
             np.zeros((many, 1)), self.condition[:, None], self.unit_load, self.joint_forces,
             ], axis=1)
-        rows[:, PUBLISHED_FORCES], rows[:, RESTART] = self.forces, self.restarts
+        rows[:, PUBLISHED], rows[:, RESTART] = self.forces, self.restarts
         states = rows[:, WARNING_STATE]
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
         rows[:, JOINT_ANGLES], rows[:, CLEARANCES] = self.joint_angles, self.clearances
         outputs = Outputs(np.ones(many, dtype=bool), self.stamps, rows,
-                          Computed(limited, limited, False), FIRST)
+                          Computed.of(parameters, limited, limited), FIRST)
         np.testing.assert_array_equal(outputs.warnings, self.warnings)
         np.testing.assert_array_equal(outputs.times_to_crossing, self.time_to_crossing)
         return outputs

@@ -91,7 +91,7 @@ def draw_forces(axes: Any, recorded: Recorded) -> None:
     time = recorded.seconds
     at, crossing = recorded.crossing
     limit = recorded.parameters.limits.force_max[0] / 1e3
-    forces = recorded.outputs.demanded_forces / 1e3
+    forces = recorded.outputs.demanded_efforts / 1e3
     for leg, force, color in zip(recorded.parameters.joints, forces.T, LEG_COLORS, strict=True):
         # No line between the two branches.
         axes.plot(np.insert(time, at + 1, crossing), np.insert(force, at + 1, np.nan),
@@ -149,7 +149,7 @@ def draw_figures(path: Path, recorded: Recorded) -> None:
         ('14: acceleration', 'a  [m/s²]', motions[:, 18:21], ('x', 'y', 'z')),
         ('14: angular acceleration', 'dω/dt  [deg/s²]', np.degrees(motions[:, 21:24]),
          ('x', 'y', 'z')),
-        ('15: leg lengths', 'length  [m]', outputs.lengths,
+        ('15: leg lengths', 'length  [m]', outputs.drive_positions,
          [leg.replace('_', ' ') for leg in recorded.parameters.joints])]
     for n, (title, label, values, names) in enumerate(panels, start=1):
         axes = figure.add_subplot(5, 2, n)

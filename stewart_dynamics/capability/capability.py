@@ -193,7 +193,7 @@ class Capability:
             None if clearance is None else Clearance(
                 clearance.shapes, nearest, size, *map(len, self._plates)), size,
             _on_circles(platform.parameters))
-        self._ends_differ = any(name in bounds for name in kind.end_limits)
+        self._ends_differ = kind.ends_differ and kind.joint_force_limit in bounds
         self._motors = MotorBounds(platform.parameters) if platform.parameters.drives else None
         self._frictionless = StewartPlatform(platform.parameters.replaced({
             'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}))
@@ -799,7 +799,7 @@ class Capability:
 
     def _columns(self, name: str) -> tuple[slice, ...]:
         """Return where the values of a limit of loads are in rows of ``load_rows``."""
-        if name in self._kind.end_limits:
+        if self._kind.ends_differ and name == self._kind.joint_force_limit:
             return FORCES, _OTHER_ENDS
         return limits.LIMITS[name].columns,
 

@@ -186,6 +186,16 @@ static double crank_anchor(const stewart_leg * leg, double position, vector * an
   return leg->rod_length;
 }
 
+/* A pose of this angle may be one of the other branch, beyond a dead centre. */
+static int crank_assembled(
+  const stewart_leg * leg, double position, const double origin[3], const double r[9]) {
+  vector z = read3(leg->crank_direction), n0 = cross(read3(leg->crank_axis), z);
+  vector n = subtract(scale(cos(position), n0), scale(sin(position), z)), anchor;
+  crank_anchor(leg, position, &anchor);
+  leg_line at = line_from(anchor, leg, origin, r);
+  return leg->branch * dot(at.direction, n) >= -FLATNESS;
+}
+
 /* k q'' = d . B'' + L1 q'^2 d . e + |B' - A'|^2 / L2. */
 static double crank_straight(
   const stewart_leg * leg, const double position[3], const double r[9], vector x_rate,
@@ -212,6 +222,20 @@ static double * crank_commands(stewart_output * output) {return output->torques;
 static double crank_rate_max(const stewart_leg * leg) {return leg->crank_speed_max;}
 static double crank_lever_ratio(const stewart_leg * leg, double lever)
 {return fabs(lever) / leg->crank_length;}
+
+/* The square of the lever is the reserve of reach, h^2 (L1 / L2)^2: unlike the lever it is smooth
+   at a dead centre, so that its rate shows when the least lever is reached. */
+static double crank_lever_time(
+  const stewart_leg * leg, const stewart_motion * motion, double lever) {
+  crank_motion of = crank_motion_of(leg, motion);
+  vector d = of.at.line.direction, d_rate = scale(of.at.line.per_length, of.gap_rate);
+  double lever_rate = leg->crank_length *
+    (dot(d_rate, of.at.normal) - of.drive.rate * dot(d, of.at.along));
+  double least_lever = leg->lever_min * leg->crank_length;
+  double left = lever * lever - least_lever * least_lever, rate = 2.0 * lever * lever_rate;
+  if (!(left > 0.0)) {return 0.0;}
+  return rate < 0.0 ? -left / rate : HUGE_VAL;
+}
 
 /* The rod as two points with a coupling, and the crank with the point at its end: exact where the
    rod has no inertia about its own axis. */

@@ -366,11 +366,13 @@ static leg_line line_from(
    drive: the motion of the drive.
    put, finish: write the numbers of the leg, and of all legs, for pushes along the lines.
    anchor: where the line begins at a position of the drive; returns its length.
+   assembled: whether the leg at a position of the drive is assembled as the hexapod is.
    straight: the part of a drive's acceleration, times the lever, that is linear in the
      acceleration of the platform.
    missing: distance by which the leg misses its platform joint [m].
    positions, efforts, commands: of the drives, among the results and the outputs.
    rate_max, lever_ratio: limit of the drive's rate; magnitude of the lever by its largest.
+   lever_time: until the lever falls to its limit [s].
    complete, check: see stewart_complete, stewart_check.
    For the library, in the second part of the file: see legs.c. */
 #include "telescopic.h"
@@ -440,6 +442,14 @@ static double anchor_of(
   }
 }
 
+static int assembled_of(
+  const stewart_platform * platform, int i, double position, const stewart_pose * pose) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, assembled, (
+      &platform->legs[i], position, pose->position, pose->rotation))
+  }
+}
+
 static double straight_of(
   const stewart_platform * platform, int i, const stewart_motion * motion, vector x_rate,
   double rate, double acceleration) {
@@ -483,6 +493,13 @@ static double rate_max_of(const stewart_platform * platform, int i) {
 static double lever_ratio_of(const stewart_platform * platform, int i, double lever) {
   switch (platform->leg_kind) {
     default: STEWART_LEG_KINDS(RETURN, lever_ratio, (&platform->legs[i], lever))
+  }
+}
+
+static double lever_time_of(
+  const stewart_platform * platform, int i, const stewart_motion * motion, double lever) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, lever_time, (&platform->legs[i], motion, lever))
   }
 }
 
@@ -982,6 +999,7 @@ static void complete_loads(
     }
     to->positions[i] = positions_of(platform, result)[i] - leg->zero_length;
     to->lever_ratios[i] = lever_ratio_of(platform, i, result->levers[i]);
+    to->lever_times[i] = lever_time_of(platform, i, motion, result->levers[i]);
     to->forces[i] = clipped(result->forces[i], leg->force_max);
     to->torques[i] = clipped(result->torques[i], leg->crank_torque_max);
     to->base_joint_angles[i] = to->platform_joint_angles[i] = to->clearances[i] = NAN;
@@ -1454,6 +1472,9 @@ static int find_pose(
     if (done == 1.0) {code = STEWART_OK, *residual = error;}
   }
   *steps += more;
+  for (int i = 0; code == STEWART_OK && i < 6; i++) {
+    code = assembled_of(platform, i, positions[i], &found) ? STEWART_OK : STEWART_NO_POSE;
+  }
   if (code == STEWART_OK) {*pose = found;}
   return code;
 }

@@ -233,6 +233,8 @@ typedef struct {
   double torques[6];       /* likewise of cranks [N m]: clipped to crank_torque_max; else zero */
   double positions[6];     /* of the joints: lengths less zero_length [m], or angles [rad] */
   double lever_ratios[6];  /* lever of a crank by its length, 0 to 1; 1 of a telescopic leg */
+  double lever_times[6];   /* until a lever falls to lever_min, at the present rate of its square
+                              [s]: 0 where it has; infinite: never */
   double mean_rates[6];    /* of the drives from the last setpoint that was not a jump [m/s] or
                               [rad/s]; nan at the first */
   double base_joint_angles[6], platform_joint_angles[6]; /* [rad] */

@@ -197,6 +197,10 @@ static double telescopic_anchor(const stewart_leg * leg, double position, vector
 {*anchor = read3(leg->base_joint); return position;}
 
 /* L'' = s . x'' + |x' across the leg|^2 / L. */
+static int telescopic_assembled(
+  const stewart_leg * leg, double position, const double origin[3], const double r[9])
+{(void)leg, (void)position, (void)origin, (void)r; return 1;}
+
 static double telescopic_straight(
   const stewart_leg * leg, const double position[3], const double r[9], vector x_rate,
   double rate, double acceleration) {
@@ -216,6 +220,9 @@ static double * telescopic_commands(stewart_output * output) {return output->for
 static double telescopic_rate_max(const stewart_leg * leg) {return leg->velocity_max;}
 static double telescopic_lever_ratio(const stewart_leg * leg, double lever)
 {(void)leg, (void)lever; return 1.0;}
+static double telescopic_lever_time(
+  const stewart_leg * leg, const stewart_motion * motion, double lever)
+{(void)leg, (void)motion, (void)lever; return HUGE_VAL;}
 
 static void telescopic_complete(stewart_leg * leg) {
   double gear = leg->gear_ratio, ratio = leg->screw_lead > 0.0 ?

@@ -14,8 +14,8 @@ from pathlib import Path
 import subprocess
 import sys
 
-from stewart_dynamics.legs.mechanism import DescriptionError
 from stewart_dynamics.errors import one_line
+from stewart_dynamics.legs.mechanism import DescriptionError
 
 _TIME = 30  # [s]
 _WAIT = 4 * _TIME

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 from stewart_dynamics import __version__
 from stewart_dynamics.description.hexapod import Hexapod
-from stewart_dynamics.legs.mechanism import BALL, DescriptionError, FIXED
 from stewart_dynamics.errors import ParameterError, shown
+from stewart_dynamics.legs.mechanism import BALL, DescriptionError, FIXED
 from stewart_dynamics.parameters.yaml_file import read_document
 
 _HEAD = """\

@@ -18,8 +18,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.legs.mechanism import Placement
 from stewart_dynamics.description.read_urdf import axis_of, end_of, origin_of
+from stewart_dynamics.legs.mechanism import Placement
 from stewart_dynamics.mechanics.frames.rotation import (
     quaternion_of, quaternion_product, to_quaternion)
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints

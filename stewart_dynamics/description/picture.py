@@ -5,8 +5,8 @@
 A picture (SVG) of a hexapod at home, with numbered joints: to be compared with the machine.
 
 It shows numbers as they were read, base joints as discs and platform joints as rings, from above
-and from the front of the base frame, and a table of the legs. Where drives turn, it shows the bodies
-between these joints, and how the end of the first one moves while the angle grows: an arrow, or,
+and from the front of the base frame, and a table of the legs. Where drives turn, it shows both
+bodies of a leg, and the motion of the end of the first one while the angle grows: an arrow, or,
 as for vectors across a page, a dot toward the reader and a cross away from the reader.
 """
 
@@ -64,8 +64,8 @@ def picture(hexapod: Hexapod, name: str) -> str:
           f'{_number(y)}, {_number(z)} m, turned by {angles} degrees.')
     words = 'Discs are base joints, rings platform joints.'
     if knees:
-        words += (' Arrows: motion at a growing angle; dot in a ring: toward you, cross: away from '
-                  'you.')
+        words += (' Arrows: motion at a growing angle; dot in a ring: toward you, cross: away '
+                  'from you.')
     _text(root, 20.0, _VIEW + 44.0, words)
     _table(root, hexapod)
     return text_of(root, 'Numbers are legs in the order of all arrays of six.')

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.description.bounded_process import load_in_process, unusable
+from stewart_dynamics.description.xml_text import CARRIED, ELEMENT
 from stewart_dynamics.legs.mechanism import (
     BALL, CarriedParameter, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER,
     Placement, SLIDE, WORLD)
-from stewart_dynamics.description.xml_text import CARRIED, ELEMENT
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.parameters.table import PARAMETERS
 

@@ -13,13 +13,13 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.legs.mechanism import (
-    BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement,
-    SLIDE, UNIVERSAL, WORLD)
 from stewart_dynamics.description.read_urdf import (
     body_of, carried_of, numbers_of, shapes_of, unit)
 from stewart_dynamics.description.sdf import DRAKE, POSITION
 from stewart_dynamics.description.xml_text import CARRIED
+from stewart_dynamics.legs.mechanism import (
+    BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement,
+    SLIDE, UNIVERSAL, WORLD)
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import INERTIA
 

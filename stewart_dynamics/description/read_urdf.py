@@ -20,10 +20,10 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.loops import loops_beside
+from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.legs.mechanism import (
     BALL, CarriedParameter, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody,
     OTHER, Placement, SLIDE, UNIVERSAL)
-from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import INERTIA, inertia_matrix
 

@@ -19,12 +19,12 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.bounded_process import load_in_process, unusable
-from stewart_dynamics.legs.mechanism import (
-    BALL, CarriedParameter, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER,
-    Placement, SLIDE, UNIVERSAL, WORLD)
 from stewart_dynamics.description.usd import (
     ANGULAR, armature, attribute_name, coulomb_friction, ELEMENT, LINEAR, POSITION, rate_limit,
     VALUE)
+from stewart_dynamics.legs.mechanism import (
+    BALL, CarriedParameter, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER,
+    Placement, SLIDE, UNIVERSAL, WORLD)
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.parameters.table import PARAMETERS, STANDARD_GRAVITY
 

@@ -30,9 +30,9 @@ from stewart_dynamics.description.topology import LEGS, Topology, topology_of
 from stewart_dynamics.description.xml_text import NOT_SET
 from stewart_dynamics.errors import one_line, ParameterError
 from stewart_dynamics.legs.kind import LegKind
+from stewart_dynamics.legs.leg_reading import passive
 from stewart_dynamics.legs.mechanism import (
     Chain, DescriptionError, joined, Mechanism, MechanismBody, Placement)
-from stewart_dynamics.legs.reading import passive
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of, level_axes

@@ -98,7 +98,7 @@ def golden_vectors(parameters: Parameters) -> Array:
             continue
         code, steps, residual = np.empty(1, dtype=int), np.empty(1, dtype=int), np.empty(1)
         forward_kinematics.poses(
-            hexapod, outputs.lengths.copy(), guess, code, steps, residual)
+            hexapod, outputs.drive_positions.copy(), guess, code, steps, residual)
         rows.append([
             stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(outputs),
             *_commanded(outputs), *_motors(drives, motions[n:n + 1], outputs), int(code[0]),
@@ -127,11 +127,12 @@ def _motions(parameters: Parameters) -> Array:
 
 def _results(outputs: Outputs) -> list[float]:
     """Return the columns from CODE to WARNING of one setpoint's outputs."""
-    forces = outputs.forces[0]
-    code = SINGULAR if not outputs.solvable[0] else OK if outputs.with_forces[0] else SUPPRESSED
+    forces = outputs.efforts[0]
+    code = SINGULAR if not outputs.solvable[0] else OK if outputs.with_efforts[0] else SUPPRESSED
     exceeded = outputs.records['exceeded'][0]
     state = outputs.singularity()
-    return [code, *outputs.lengths[0], *outputs.rates[0], *_or_zero(outputs.demanded_forces[0]),
+    return [code, *outputs.drive_positions[0], *outputs.rates[0],
+            *_or_zero(outputs.demanded_efforts[0]),
             outputs.determinants[0], outputs.determinant_rates[0], outputs.conditions[0],
             *outputs.unit_load_forces[0], *_or_zero(outputs.joint_forces[0]), *_or_zero(forces),
             *exceeded, state.cause, state.stopped, state.crossings]
@@ -153,5 +154,5 @@ def _motors(drives: Drives | None, motions: Array, outputs: Outputs) -> list[flo
     if drives is None:
         return [NO_MOTORS, *np.zeros(len(PARTS['MOTORS']))]
     results = np.zeros((1, RESULT))
-    results[:, FORCES] = _or_zero(outputs.demanded_forces)
+    results[:, FORCES] = _or_zero(outputs.demanded_efforts)
     return [OK, *drives(motions, results)[0, MECHANICAL]]

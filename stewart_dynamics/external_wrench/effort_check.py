@@ -16,7 +16,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import SECOND, Six
 from stewart_dynamics.mechanics.drives.measured_efforts import EffortSums, LegMistake
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import OF_DRIVES, Parameters
 
 # Length of a block [ns]; the first ones are shorter, of 1, 2, 4, ... measurements.
 _BLOCK = SECOND // 10
@@ -30,7 +30,8 @@ class EffortCheck:
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
-        self._sums = EffortSums(parameters)
+        of_motors = parameters.external_wrench.efforts != OF_DRIVES
+        self._sums = EffortSums(parameters, of_motors)
         self._right = 0
         self._begin()
         self._shortest = 1
@@ -65,7 +66,8 @@ class EffortCheck:
         self._shortest *= 2
         measured, differences = np.array(
             [self._forces, self._differences])[..., None] / self._count
-        block = EffortSums(self._parameters)
+        block = EffortSums(
+            self._parameters, self._parameters.external_wrench.efforts != OF_DRIVES)
         for sums in (block, self._sums):
             sums.add(measured, measured - differences, weight=self._count)
         self._right += block.alike

@@ -47,6 +47,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, NANOSECOND, NO_WRENCH, SECOND, Six
 from stewart_dynamics.core.binding import CODES, function, Sample
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
+from stewart_dynamics.legs.kind import Named
 from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
@@ -65,9 +66,9 @@ class Measurement(NamedTuple):
     """Measurement of the six legs at one time."""
 
     stamp: int  # [ns]
-    lengths: Six  # [m]
-    rates: Six  # [m/s]
-    forces: Six  # of the actuators since the last measurement [N], + pushes
+    positions: Six  # of the drives: lengths [m], ...
+    rates: Six
+    efforts: Six  # of the actuators since the last measurement
 
 
 class Target(NamedTuple):
@@ -93,7 +94,7 @@ class Estimate(NamedTuple):
     """A row of motion: pose, twist, and the acceleration since the last measurement."""
     wrench: Six | None  # the external wrench, filtered; None for the first measurement [N, N m]
     differences: Six | None
-    """Measured - model, not filtered (6) [N]; none of the first measurement."""
+    """Measured - model efforts, not filtered (6); none of the first measurement."""
     base: tuple[float, ...] = NO_BASE  # a row of the base's motion; of nan: it is still
     overloads: tuple[Overload, ...] = ()
     mistake: LegMistake | None = None  # likely mistake in the measurements
@@ -119,7 +120,7 @@ class _Result(NamedTuple):
 
     motion_after: tuple[float, ...]
     after: Six  # external wrench [N, N m]
-    differences: Six  # [N]
+    differences: Six  # of efforts
     steps: float  # of the forward kinematics
     residual: float  # [m]
     across: float  # the last setpoint is on the other side of a singularity
@@ -173,7 +174,7 @@ class ExternalWrench:
             home were tried as well.
         Raises MotionError: numbers overflow.
         """
-        given = (*measurement.lengths, *measurement.rates, *measurement.forces, *known)
+        given = (*measurement.positions, *measurement.rates, *measurement.efforts, *known)
         interval = 0 if before is None else measurement.stamp - before.stamp
         if before is not None and 0 < interval <= self._longest_gap:
             seconds = interval * NANOSECOND
@@ -192,7 +193,7 @@ class ExternalWrench:
                 if result.code == forward_kinematics.FOUND:
                     break
         if result.code != forward_kinematics.FOUND:
-            raise _error(measurement, result)
+            raise _error(measurement, result, self._parameters.leg_kind.position)
         motion = result.motion_after
         if not 0 < interval <= self._longest_gap:
             return Estimate(measurement.stamp, motion, None, None, base)
@@ -237,13 +238,12 @@ class ExternalWrench:
                 yield Overload(limit, value, bound)
 
 
-def _error(measurement: Measurement, result: _Result,
+def _error(measurement: Measurement, result: _Result, position: Named,
            ) -> PoseError | SingularityError | MotionError:
-    code, lengths = result.code, ', '.join(f'{x:.6g}' for x in measurement.lengths)
+    code, numbers = result.code, ', '.join(f'{x:.6g}' for x in measurement.positions)
+    given = f'{position.field} [{numbers}] {position.unit}'
     if code == CODES['STEWART_OUT_OF_RANGE']:
         return MotionError(f'stamp {measurement.stamp} ns')
     if code == forward_kinematics.SINGULAR:
-        return SingularityError(f'lengths [{lengths}] m')
-    residual, steps = result.residual, result.steps
-    return PoseError(f'lengths [{lengths}] m: did not converge: residual {residual:.3g} m after '
-                     f'{steps:.0f} iterations')
+        return SingularityError(given)
+    return PoseError(f'{given}: {forward_kinematics.failure(result.steps, result.residual)}')

@@ -15,17 +15,18 @@ from struct import Struct
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, SECOND, Six, Stamps
+from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Six, Stamps
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError, StewartError
 from stewart_dynamics.external_wrench.effort_check import EffortCheck
 from stewart_dynamics.external_wrench.estimate import (
     Estimate, ExternalWrench, Measurement, Target)
 from stewart_dynamics.external_wrench.rate_check import RateCheck
-from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake, STAMPS
+from stewart_dynamics.mechanics.drives.measured_efforts import (
+    force_per_effort, has_losses, LegMistake, STAMPS, without_losses)
 from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, NO_BASE, TWIST, WRENCH
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import MOTOR_CURRENTS, MOTOR_TORQUES, Parameters
 from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.rejections import (
@@ -106,6 +107,35 @@ SINGULAR = 'singular pose'
 _OF_ERROR = {PoseError: NOT_CONVERGED, SingularityError: SINGULAR, MotionError: OUT_OF_RANGE}
 
 
+class EffortsOfMotors:
+    """Takes measured torques or currents of motors as efforts of the drives."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        efforts = parameters.external_wrench.efforts
+        self._parameters = parameters
+        self._factors = force_per_effort(
+            parameters, efforts == MOTOR_TORQUES, efforts == MOTOR_CURRENTS)
+        self._losses = self._factors is not None and has_losses(parameters)
+        self._longest_gap = parameters.setpoint.timeout * SECOND
+        self._before: Measurement | None = None
+
+    def to_drives(self, measurement: Measurement) -> Measurement:
+        """Return a measurement with efforts of the drives."""
+        if self._factors is None:
+            return measurement
+        efforts = self._factors * measurement.efforts
+        if self._losses:
+            before, self._before = self._before, measurement
+            rates: Array = np.array([measurement.rates])
+            accelerations: Array = np.zeros((1, 6))
+            # What turns the rotor passes no gear.
+            if before and 0 < (passed := measurement.stamp - before.stamp) <= self._longest_gap:
+                accelerations = (rates - before.rates) / (passed * NANOSECOND)
+            efforts = without_losses(efforts[None], rates, accelerations, self._parameters)[0]
+        a, b, c, d, e, f = efforts.tolist()
+        return measurement._replace(efforts=(a, b, c, d, e, f))
+
+
 class MeasuredLegs:
     """
     Follows the measured legs.
@@ -118,7 +148,7 @@ class MeasuredLegs:
             self, parameters: Parameters, step: ExternalWrench,
             rejected: Callable[[Rejection, str], None],
             noticed: Callable[[str], object], history: LegHistory | None = None) -> None:
-        self._step = step
+        self._step, self._of_motors = step, EffortsOfMotors(parameters)
         self._efforts, self._rates = EffortCheck(parameters), RateCheck(parameters)
         self._stamps = ArrivalStamps()
         self._reader = JointStateReader(
@@ -144,7 +174,7 @@ class MeasuredLegs:
 
     def use(self, parameters: Parameters, step: ExternalWrench) -> None:
         """Use changed parameters from now on."""
-        self._step = step
+        self._step, self._of_motors = step, EffortsOfMotors(parameters)
         if self._efforts.mistake is not None:
             self._efforts = EffortCheck(parameters)  # they may have been the mistake
 
@@ -161,7 +191,8 @@ class MeasuredLegs:
         found = None
         for measurement in self._measurements(data):
             if self._in_time(measurement.stamp):
-                found = self._estimated(measurement, known, target, base) or found
+                found = self._estimated(
+                    self._of_motors.to_drives(measurement), known, target, base) or found
         return found
 
     def _estimated(self, measurement: Measurement, known: Six, target: Target | None,
@@ -176,13 +207,13 @@ class MeasuredLegs:
         except StewartError as exc:
             self._reject(_OF_ERROR[type(exc)], str(exc))
             return None
-        self._efforts.add(last.stamp, measurement.forces, last.differences)
+        self._efforts.add(last.stamp, measurement.efforts, last.differences)
         self._rates.add(measurement, last)
-        self._stamps.add(last.stamp, measurement.lengths)
+        self._stamps.add(last.stamp, measurement.positions)
         mistake = self.mistake
         self._last = last if mistake is None else last._replace(mistake=mistake)
         if self._history is not None:
-            self._history.add(measurement.forces, self._last, known)
+            self._history.add(measurement.efforts, self._last, known)
         return self._last
 
     def _reject(self, reason: str, details: str) -> None:

@@ -31,12 +31,12 @@ from stewart_dynamics.external_wrench.measured_legs import (
     ACTED, LegHistory, LOADED, motions_of, OF_BASE, stamps_of, TURNED)
 from stewart_dynamics.mechanics.dynamics.friction import Friction, slip_in_noise
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
-    BODY_UNITS, COULOMB_FRICTION, FIRST_MOMENT, inertial_derivative, LINEAR, linear_parameters,
-    PLATFORM, VISCOUS_FRICTION)
-from stewart_dynamics.mechanics.rows import ACCELERATION, BASE, FORCES, GRAVITY, LENGTHS, MOTION
+    BODY_UNITS, FIRST_MOMENT, inertial_derivative, linear_parameters, Places, PLATFORM)
+from stewart_dynamics.mechanics.rows import ACCELERATION, BASE, GRAVITY, MOTION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
 from stewart_dynamics.parameters.body import Body
+from stewart_dynamics.parameters.table import Parameters
 
 # Measurements between two yields.
 PIECE = 128
@@ -58,7 +58,7 @@ _FOURTH_VARIANCE = 70.0
 # Friction is uncertain by its own size; what holds a leg at rest is anything up to Coulomb's.
 _STATIC = 1.0 / math.sqrt(3.0)
 
-# An effort of these parts of limits.force_max is saturated: sensors have noise. Larger ones are
+# An effort of these parts of its limit is saturated: sensors have noise. Larger ones are
 # of another unit, or of a drive that does not have this limit.
 _SATURATED = 0.99, 1.02
 
@@ -99,7 +99,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
 
     Measurements may be added to the history meanwhile; those from now on are not used.
     """
-    p = platform.parameters
+    p, effort = platform.parameters, platform.parameters.leg_kind.effort
     begin, end = _range(history, p.payload.window)
     rows = np.empty((end - begin, OF_BASE.stop))
     for some in _pieces(len(rows), _COPIED):
@@ -124,15 +124,15 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
         more = '' if needed < p.payload.window else ', more than payload.window'
         yield PayloadOutcome(
             f'too short: {seconds:.1f} s of measured legs, {needed:.1f} s without gaps are needed'
-            f'{more}{_excluded(work.excluded)}')
+            f'{more}{_excluded(work.excluded, p)}')
         return
     if not math.isfinite(work.scale):
         yield PayloadOutcome('numbers overflow')
         return
     if not _LEAST_SCALE < work.scale < _MOST_SCALE:
         what = 'sign' if work.scale < 0.0 else 'unit'
-        yield PayloadOutcome(f'the measured forces are {work.scale:.3g} times those of the model: '
-                             f'likely they have another {what}')
+        yield PayloadOutcome(f'the measured {effort.field} are {work.scale:.3g} times those of '
+                             f'the model: likely they have another {what}')
         return
     samples = yield from work.samples()
     fit = BodyFit(samples, p.carried)
@@ -145,10 +145,11 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Payload
         yield PayloadOutcome(f'the fit failed: {exc}')
         return
     if fitted.residual > _UNEXPLAINED * samples.measured:
-        yield PayloadOutcome(f'the model does not explain the measured forces: residual '
-                             f'{fitted.residual:.3g} N of {samples.measured:.4g} N (RMS)')
+        yield PayloadOutcome(f'the model does not explain the measured {effort.field}: residual '
+                             f'{fitted.residual:.3g} {effort.unit} of {samples.measured:.4g} '
+                             f'{effort.unit} (RMS)')
         return
-    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, p.platform.body))
+    yield _outcome(Payload(work.stamp, seconds, work.excluded, fitted, p.platform.body), p)
 
 
 def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
@@ -170,18 +171,19 @@ def _pieces(count: int, size: int) -> Iterator[slice]:
 class _Windows:
     """Means of the inputs of the fit over windows."""
 
-    scale: float  # of the forces, by those of the model
+    scale: float  # of the efforts, by those of the model
 
     def __init__(self, platform: StewartPlatform, rows: Array) -> None:
-        p = platform.parameters
+        p, kind = platform.parameters, platform.parameters.leg_kind
         self._platform, self._rows = platform, rows
+        self._kind, self._places = kind, Places.of(kind)
         stamps = stamps_of(rows)
         self.stamp, self.seconds = int(stamps[-1]), (stamps - stamps[0]) * NANOSECOND
-        parts = np.abs(rows[:, ACTED]) / table.six_of(p.limits.force_max, math.inf)
+        parts = np.abs(rows[:, ACTED]) / table.six_of(p[kind.effort_limit], math.inf)
         self._saturated: Flags = np.any(
             (parts > _SATURATED[0]) & (parts < _SATURATED[1]), axis=1)
-        self._shortest = table.six_of(p.limits.length_min, 0.0)
-        self._longest = table.six_of(p.limits.length_max, math.inf)
+        self._lowest, self._highest = (table.six_of(p[name], bound) for name, bound in zip(
+            kind.position_limits, (-math.inf, math.inf), strict=True))
         self._friction = Friction.of(p)
         self.excluded = 0
         self._steps = np.diff(self.seconds)
@@ -191,8 +193,8 @@ class _Windows:
         # Noise of an acceleration divided by the noise of a twist: the window's slope.
         self._noise_gain = math.pi ** 2 * interval / (4.0 * self.half_width ** 3)
         many = int(self.seconds[-1] / self.half_width) + 2
-        # The regressor of each leg, its force less that of the model, and that.
-        self._sums = np.zeros((many, 6, LINEAR + 2))
+        # The regressor of each leg, its effort less that of the model, and that.
+        self._sums = np.zeros((many, 6, self._places.whole + 2))
         self._motions, self._bases = np.zeros((many, MOTION)), np.full((many, BASE), np.nan)
         self._covered = np.zeros(many)
         self._added: list[tuple[Integers, Array]] = []  # measurements and rates of the drives
@@ -211,20 +213,20 @@ class _Windows:
         motions, bases = motions_of(rows), rows[:, OF_BASE]
         motions[:, ACCELERATION] = (
             following[:, TURNED] - self._rows[at - 1, TURNED]) / (before + after)
-        forces = (rows[:, ACTED] * before + following[:, ACTED] * after) / (before + after)
+        efforts = (rows[:, ACTED] * before + following[:, ACTED] * after) / (before + after)
         results = self._platform.solve(motions, rows[:, LOADED], bases)
-        lengths = results[:, LENGTHS]
+        positions, count = results[:, self._kind.position.columns], self._places.whole
         # Efforts have no part of the force of an end stop.
         right = ~(self._saturated[at] | self._saturated[at + 1]) & np.all(
-            (lengths > self._shortest) & (lengths < self._longest), axis=1)
+            (positions > self._lowest) & (positions < self._highest), axis=1)
         self.excluded += int(np.count_nonzero(~right))
-        values = np.empty((len(at), 6, LINEAR + 2))
-        values[..., :LINEAR] = self._platform.regressors(motions, bases)
+        values = np.empty((len(at), 6, count + 2))
+        values[..., :count] = self._platform.regressors(motions, bases)
         rates, sliding = (values[:, _LEGS, kind.start + _LEGS] for kind in (
-            VISCOUS_FRICTION, COULOMB_FRICTION))
-        values[:, _LEGS, COULOMB_FRICTION.start + _LEGS] = 0.0
-        model = results[:, FORCES] - self._friction.coulomb * sliding
-        values[..., LINEAR], values[..., LINEAR + 1] = forces - model, model
+            self._places.viscous_friction, self._places.coulomb_friction))
+        values[:, _LEGS, self._places.coulomb_friction.start + _LEGS] = 0.0
+        model = results[:, self._kind.effort.columns] - self._friction.coulomb * sliding
+        values[..., count], values[..., count + 1] = efforts - model, model
         right &= np.isfinite(values.sum(axis=(1, 2)))  # not where J_inv cannot be solved
         which: Any = slice(None) if right.all() else right  # without a copy of all
         used = at[which]
@@ -261,10 +263,10 @@ class _Windows:
         rates, deviations = rates_in_noise(self._rates[some], self._rate_deviations)
         slip = slip_in_noise(rates, self._friction.coulomb_velocity, deviations)
         windows, share = self._share(self.used[some])
-        means = share @ slip
-        self._sums[windows, _LEGS, COULOMB_FRICTION.start + _LEGS] += means
-        self._sums[windows, :, LINEAR] -= self._friction.coulomb * means
-        self._sums[windows, :, LINEAR + 1] += self._friction.coulomb * means
+        means, count = share @ slip, self._places.whole
+        self._sums[windows, _LEGS, self._places.coulomb_friction.start + _LEGS] += means
+        self._sums[windows, :, count] -= self._friction.coulomb * means
+        self._sums[windows, :, count + 1] += self._friction.coulomb * means
 
     def _turns(self, at: Integers) -> Integers:
         """Return the windows in the first half of which measurements are, less one."""
@@ -287,31 +289,31 @@ class _Windows:
         """Return whether there are enough windows, of which the means and the scale are found."""
         self._are_full = self._covered > _COVERED * self.half_width
         self._means = self._sums[self._are_full] / self._covered[self._are_full, None, None]
-        modelled = self._means[..., LINEAR + 1]
-        self.scale = 1.0 + float(
-            np.sum(self._means[..., LINEAR] * modelled) / np.sum(modelled ** 2))
+        differences, modelled = self._means[..., -2], self._means[..., -1]
+        self.scale = 1.0 + float(np.sum(differences * modelled) / np.sum(modelled ** 2))
         return len(self._means) >= LEAST_WINDOWS
 
     def samples(self) -> Generator[None, None, LegSamples]:
         """Return the means over the windows; yield after each piece."""
         full, means = self._are_full, self._means
         motions, bases = self._motions[full], self._bases[full]
-        differences, modelled = means[..., LINEAR], means[..., LINEAR + 1]
-        p = self._platform.parameters
-        of_friction = np.zeros(LINEAR)
-        of_friction[VISCOUS_FRICTION] = self._friction.viscous
-        of_friction[COULOMB_FRICTION] = self._friction.coulomb
+        differences, modelled = means[..., -2], means[..., -1]
+        p, places, count = self._platform.parameters, self._places, self._places.whole
+        of_friction = np.zeros(count)
+        of_friction[places.viscous_friction] = self._friction.viscous
+        of_friction[places.coulomb_friction] = self._friction.coulomb
         root = root_of_covariance(p, p.carried, of_friction)
         yield
         root[FIRST_MOMENT] *= p.carried.mass
         change = root[PLATFORM, PLATFORM].copy()
         root[PLATFORM] = inertial_derivative(1.0, p.carried.center) @ root[PLATFORM]
-        root = root[:, np.any(root != 0.0, axis=0) | (np.arange(LINEAR) < TEN)]
+        root = root[:, np.any(root != 0.0, axis=0) | (np.arange(count) < TEN)]
         by_tilt = self._by_tilt(motions, bases)
         yield
-        standing = self._friction.is_linear(means[:, _LEGS, VISCOUS_FRICTION.start + _LEGS])
+        standing = self._friction.is_linear(
+            means[:, _LEGS, places.viscous_friction.start + _LEGS])
         weight = self.scale * modelled
-        parts = (means[..., :LINEAR] @ root,
+        parts = (means[..., :count] @ root,
                  (standing * _STATIC * self._friction.coulomb)[..., None] * np.eye(6),
                  p.uncertainty.tilt * by_tilt,
                  p.uncertainty.effort_gain * weight[..., None], differences[..., None])
@@ -342,22 +344,23 @@ class _Windows:
         motions = np.tile(motion, (7, 1))
         motions[1:, ACCELERATION] += np.eye(6)
         columns = self._platform.regressors(motions, base) @ root
-        model = self._platform.solve(motions, None, base)[:, FORCES]
+        model = self._platform.solve(motions, None, base)[:, self._kind.effort.columns]
         return columns[1:] - columns[0], model[0] - model[1:]
 
 
-def _outcome(payload: Payload) -> PayloadOutcome:
-    fitted = payload.fitted
+def _outcome(payload: Payload, p: Parameters) -> PayloadOutcome:
+    fitted, effort = payload.fitted, p.leg_kind.effort
     mass = fitted.body.mass
     if not mass > 0.0:
         return PayloadOutcome(f'the mass that fits best is {mass:.6g} kg: must be more than 0')
     if not fitted.known[0]:
-        return PayloadOutcome('the mass is not identifiable from the measured forces: residual '
-                              f'{fitted.residual:.3g} N (RMS){_of_gain(fitted)}')
-    return PayloadOutcome(_words(payload), payload)
+        return PayloadOutcome(
+            f'the mass is not identifiable from the measured {effort.field}: residual '
+            f'{fitted.residual:.3g} {effort.unit} (RMS){_of_gain(fitted)}')
+    return PayloadOutcome(_words(payload, p), payload)
 
 
-def _words(payload: Payload) -> str:
+def _words(payload: Payload, p: Parameters) -> str:
     """Return the identified numbers, the others' names and the parameters to set, in one line."""
     fitted, more = payload.fitted, payload.fitted.body.mass - payload.given.mass
     rows = rows_of(fitted)
@@ -367,7 +370,7 @@ def _words(payload: Payload) -> str:
     text = (f'{", ".join(known)}; {abs(more):.{_decimals(fitted.half_widths[0])}f} kg '
             f'{"less" if more < 0.0 else "more"} than platform.mass; from '
             f'{payload.seconds:.1f} s')
-    text += _excluded(payload.excluded)
+    text += _excluded(payload.excluded, p)
     text += _of_gain(fitted)
     if not fitted.consistent:
         text += '; no real body has the inertia that fits best'
@@ -408,9 +411,9 @@ def _of_gain(fitted: FittedBody) -> str:
         'widens the intervals: check the scale of the efforts')
 
 
-def _excluded(count: int) -> str:
-    return '' if not count else (f'; {count} measurements not used: efforts at limits.force_max '
-                                 'or legs at their ends')
+def _excluded(count: int, p: Parameters) -> str:
+    return '' if not count else (f'; {count} measurements not used: efforts at '
+                                 f'{p.leg_kind.effort_limit} or legs at their ends')
 
 
 def with_interval(value: float, half_width: float) -> str:

@@ -35,7 +35,7 @@ class RateCheck:
     """The check of a stream of measurements."""
 
     def __init__(self, parameters: Parameters) -> None:
-        self._joints = parameters.joints
+        self._joints, self._unit = parameters.joints, parameters.leg_kind.rate.unit
         self._consistency = Consistency(parameters.singularity.characteristic_length, None)
         self._recent: deque[Measurement] = deque(maxlen=_RECENT)
         self.mistake: LegMistake | None = None
@@ -55,19 +55,22 @@ class RateCheck:
         elif self.mistake is None:
             reasons = [each.reason for each in found.values()]
             late = next((each for each in reasons if each.endswith(('late?', 'early?'))), '')
-            self.mistake = LegMistake(RATE, _words(list(self._recent), self._joints, late))
+            self.mistake = LegMistake(RATE, _words(
+                list(self._recent), self._joints, late, self._unit))
 
 
-def _words(recent: Sequence[Measurement], joints: Sequence[str], late: str) -> str:
+def _words(recent: Sequence[Measurement], joints: Sequence[str], late: str, unit: str,
+           ) -> str:
     """Return the legs whose velocities are wrong, by how much, and the reason."""
     times = np.array([each.stamp for each in recent]) * NANOSECOND
-    lengths, rates = (np.array(each) for each in zip(*(each[1:3] for each in recent), strict=True))
+    positions, rates = (
+        np.array(each) for each in zip(*(each[1:3] for each in recent), strict=True))
     steps = np.diff(times)
     integrals = np.vstack([np.zeros((1, 6)), np.cumsum(
         0.5 * steps[:, None] * (rates[1:] + rates[:-1]), axis=0)])
     ends = slice(None, None, max(1, round(_WINDOW / float(np.median(steps)))))
     seconds, expected, given = (np.diff(each[ends], axis=0) for each in (
-        times[:, None], lengths, integrals))
+        times[:, None], positions, integrals))
     off, moved, all_given = (np.sum(each ** 2, axis=0) for each in (
         given - expected, expected, given))
     wrong: Flags = off > _WRONG * np.maximum(moved, all_given)
@@ -75,13 +78,14 @@ def _words(recent: Sequence[Measurement], joints: Sequence[str], late: str) -> s
         wrong[:] = True
     of = '' if wrong.all() else ', '.join(
         name for name, is_wrong in zip(joints, wrong, strict=True) if is_wrong) + ': '
-    by_rates, by_lengths = (float(np.sqrt(each[wrong].mean() / np.sum(seconds ** 2)))
+    by_rates, by_positions = (float(np.sqrt(each[wrong].mean() / np.sum(seconds ** 2)))
                             for each in (all_given, moved))
     reason = _reason(expected[:, wrong], given[:, wrong], float(np.mean(steps)))
     if not reason and (order := _order(expected, given)):
         reason = f'in another order, {", ".join(joints[n] for n in order)}?'
-    return (f'velocity is not the derivative of position: {of}{by_rates:.3g} m/s RMS, by the '
-            f'positions {by_lengths:.3g} m/s' + (f': {reason or late}' if reason or late else ''))
+    reason = reason or late
+    return (f'velocity is not the derivative of position: {of}{by_rates:.3g} {unit} RMS, by the '
+            f'positions {by_positions:.3g} {unit}' + (f': {reason}' if reason else ''))
 
 
 def _reason(expected: Array, given: Array, step: float) -> str:

@@ -15,11 +15,11 @@ from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs import crank_tree as tree
-from stewart_dynamics.legs.kind import LegKind, LegMass, Named
+from stewart_dynamics.legs.kind import LegKind, LegMass, Named, Placed, Solid, STANDARD_G
 from stewart_dynamics.legs.lines import (
     AnchorCircles, AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
-from stewart_dynamics.legs.tree import LegBranch
+from stewart_dynamics.legs.tree import BARREL, LegBranch, ROD
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -42,11 +42,19 @@ class Crank(LegKind):
     marker = 'legs.crank.length'
     position = Named('angle', 'angles', 'rad')
     rate = Named('speed', 'speeds', 'rad/s')
-    effort = Named('torque', 'torques', 'N m', '+ drives the angle up')
+    effort = Named('torque', 'torques', 'N m', '+ drives the angle up', 'drives it down')
+    effort_signs = 'drives the angle up', 'drives it down'
+    extremes = 'smallest angle', 'largest angle'
     position_limits = 'limits.angle_min', 'limits.angle_max'
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
-    lever_limit, end_limits = 'limits.lever_min', ('limits.rod_force_max',)
+    lever_limit, ends_differ = 'limits.lever_min', True
+    joint_force, joint_force_limit = 'rod_force', 'limits.rod_force_max'
     commands = 'torques'
+    gear, right_sign = 'gear', '+ must drive the angle up'
+    wrong_units = (
+        (1e-3, 'kN m in place of N m'), (1.0 / STANDARD_G, 'kgf m in place of N m'),
+        (1e2 / STANDARD_G, 'kgf cm in place of N m'), (1.0 / 1.355818, 'lbf ft in place of N m'),
+        (1e3, 'mN m in place of N m'), (1e2, 'N cm in place of N m'))
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
@@ -65,6 +73,7 @@ class Crank(LegKind):
     massless = {
         'legs.crank.mass': 0.0, 'legs.crank.inertia': 0.0, 'legs.rod.mass': 0.0,
         'legs.rod.inertia': 0.0, 'actuator.reflected_inertia': 0.0, 'drive.motor_inertia': None}
+    solids = Solid('cranks', BARREL), Solid('rods', ROD)
     parts, joints = tree.PARTS, (HINGE, UNIVERSAL)
     elements = (
         'actuator.reflected_inertia', 'actuator.viscous_friction', 'actuator.coulomb_friction',
@@ -103,10 +112,26 @@ class Crank(LegKind):
         legs: Any = parameters.structure['legs']
         centers, inertias = crank_bodies(parameters)
         mass = parameters['legs.crank.mass']
-        x, y, z = centers.T
-        about = np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y])
-        return np.concatenate([mass * centers.T, inertias.T + mass * about, np.stack([
+        return np.concatenate([mass * centers.T, inertias.T + mass * _about(centers), np.stack([
             legs[name] for name in ('crank_end_mass', 'coupling_mass', 'platform_end_mass')])])
+
+    def relative_changes(self, parameters: Parameters) -> list[Array]:
+        """Return changes of crank and rod."""
+        centers, inertias = crank_bodies(parameters)
+        mass, size = parameters['legs.crank.mass'], parameters['legs.rod.length']
+        legs: Any = parameters.structure['legs']
+        rod, part = legs['rod_mass'], legs['rod_center_of_mass'] / size
+        turning, none = legs['rod_inertia'] / size ** 2, np.zeros(6)
+        first, about = mass * centers.T, mass * _about(centers)
+        changes = [(np.zeros((3, 6)), np.zeros((6, 6)), each) for each in (
+            (rod * (1.0 - part) ** 2, rod * part * (1.0 - part), rod * part ** 2),
+            (-2.0 * rod * part * (1.0 - part), rod * part * (1.0 - 2.0 * part),
+             2.0 * rod * part ** 2),
+            (turning, -turning, turning))]
+        changes += [(*each, (none,) * 3) for each in (
+            (first, about), (first, 2.0 * about), (np.zeros((3, 6)), inertias.T))]
+        return [np.concatenate([moments, inertia, of_rod])
+                for moments, inertia, of_rod in changes]
 
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the rods, whose anchors are the ends of the cranks: A(q) = c + L1 e(q)."""
@@ -116,6 +141,20 @@ class Crank(LegKind):
         directions = (at.line + curvatures) / rods[:, None]
         return Lines(np.broadcast_to(rods, at.missing.shape), directions, at.arms,
                      AnchorPath(tangents, curvatures))
+
+    def anchors(self, parameters: Parameters, positions: Array) -> Array:
+        """Return the ends of the cranks."""
+        return crank_ends(parameters, positions)
+
+    def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
+                     ) -> tuple[Placed, ...]:
+        """Return the cranks at their angles, and the rods from there to the platform joints."""
+        centers, sizes = parameters.geometry.base_joints, parameters['legs.crank.length']
+        ends = crank_ends(parameters, positions)
+        cranks, rods = ends - centers, joints - ends
+        lengths = np.linalg.norm(rods, axis=1)
+        return (Placed(centers + 0.5 * cranks, cranks / sizes[:, None], sizes),
+                Placed(ends + 0.5 * rods, rods / lengths[:, None], lengths))
 
     def missing_distances(self, parameters: Parameters, position: Array, rotation: Array) -> Array:
         """Return how far each platform joint is from the nearest point that its rod reaches."""
@@ -298,6 +337,12 @@ class Crank(LegKind):
         tree.tidy(values, resolution)
 
 
+def _about(centers: Array) -> Array:
+    """Return the inertia (6, 6) of a mass of 1 at each center (6, 3), about the origin."""
+    x, y, z = centers.T
+    return np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y])
+
+
 class _Angle(NamedTuple):
     """The crank of each leg at a pose."""
 
@@ -400,9 +445,9 @@ def _unit(vectors: Array) -> Array:
 
 
 def crank_ends(parameters: Parameters, angles: Array) -> Array:
-    """Return the ends of the cranks (6, 3) at their angles (6,), base frame [m]."""
+    """Return the ends of the cranks (..., 6, 3) at their angles (..., 6), base frame [m]."""
     u, z = crank_axes(parameters)
-    along = z * np.cos(angles)[:, None] + np.cross(u, z) * np.sin(angles)[:, None]
+    along = z * np.cos(angles)[..., None] + np.cross(u, z) * np.sin(angles)[..., None]
     sizes = parameters['legs.crank.length'][:, None]
     ends: Array = parameters.geometry.base_joints + sizes * along
     return ends

@@ -18,11 +18,11 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.legs.mechanism import (
-    Chain, HINGE, joined, LegJoint, MechanismBody, Placement, SLIDE, UNIVERSAL)
-from stewart_dynamics.legs.reading import (
+from stewart_dynamics.legs.leg_reading import (
     center_of, left_out, limits_of, platform_joint, say_gap, say_outside, slender_body, SMALL,
     TURNS)
+from stewart_dynamics.legs.mechanism import (
+    Chain, HINGE, joined, LegJoint, MechanismBody, Placement, SLIDE, UNIVERSAL)
 from stewart_dynamics.legs.tree import (
     BALL, BARREL, LegBranch, LegLink, ROD, rod_shape, VisualShape)
 
@@ -62,9 +62,9 @@ def crank_legs(p: Parameters) -> CrankLegs:
                      p.geometry.platform_joints)
 
 
-def angles(legs: CrankLegs, position: Array, rotation: Array) -> tuple[Array, Array]:
+def crank_angles(legs: CrankLegs, position: Array, rotation: Array) -> tuple[Array, Array]:
     """
-    Return the angles (..., 6) and the rods in the cranks' axes (..., 6, 3) in poses.
+    Return angles (..., 6) and rods in the axes of the cranks (..., 6, 3) in poses.
 
     Where a rod does not reach, the crank points to the platform joint, or away from it.
     """
@@ -92,7 +92,7 @@ def _mounts_on_cranks(legs: CrankLegs, home: tuple[Array, Array], mounts: Array)
 
     The mounts' z are turned to the rods at home.
     """
-    q, rods = angles(legs, *home)
+    q, rods = crank_angles(legs, *home)
     found = []
     for n, rod in enumerate(rods):
         z = rod / np.linalg.norm(rod)
@@ -112,7 +112,7 @@ def branches(p: Parameters, bodies: tuple[Array, Array], position: Array, rotati
     bodies: centers of mass and inertias of the cranks (6, 3), (6, 6).
     """
     legs = crank_legs(p)
-    q = angles(legs, position, rotation)[0]
+    q = crank_angles(legs, position, rotation)[0]
     on_cranks = _mounts_on_cranks(legs, (position, rotation), mounts)
     masses, rod_centers, rod_inertias = (
         p['legs.rod.mass'], *(rod_value(p, name) for name in ('center_of_mass', 'inertia')))
@@ -160,7 +160,7 @@ def tree_positions(p: Parameters, mounts: Array, position: Array, rotation: Arra
     """Return the angle of each crank, and two of each universal joint (..., 6, 3) [rad]."""
     legs = crank_legs(p)
     on_cranks = _mounts_on_cranks(legs, home, mounts)
-    q, rods = angles(legs, position, rotation)
+    q, rods = crank_angles(legs, position, rotation)
     x, y, z = np.moveaxis(np.einsum('iba,...ib->...ia', on_cranks, rods), -1, 0).copy()
     return np.stack([q, np.arctan2(-y, z), np.arctan2(x, np.hypot(y, z))], axis=-1)
 

@@ -27,6 +27,8 @@ from stewart_dynamics.legs.tree import LegBranch
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
+STANDARD_G = 9.80665
+"""Standard acceleration of free fall, in units of force [m/s^2]."""
 _RESULT, _OUTPUT = places('stewart_result'), places('stewart_output')
 
 
@@ -37,6 +39,7 @@ class Named(NamedTuple):
     field: str  # of stewart_result, and the attribute of a result: 'lengths'
     unit: str
     positive: str = ''  # what a positive one does: '+ extends'
+    negative: str = ''  # and a negative one: 'retracts'
 
     @property
     def columns(self) -> slice:
@@ -52,6 +55,21 @@ class LegMass(NamedTuple):
     unit: str
 
 
+class Solid(NamedTuple):
+    """A cylinder of each leg, as pictures show it."""
+
+    name: str  # in the plural: 'pistons'
+    radius: float  # by the mean distance of the platform joints from their center
+
+
+class Placed(NamedTuple):
+    """A solid of the six legs at a pose, base frame."""
+
+    centers: Array  # (6, 3) [m]
+    directions: Array  # unit vectors (6, 3)
+    lengths: Array  # (6,) [m]
+
+
 class LegKind(ABC):
     """
     A kind of legs.
@@ -64,18 +82,30 @@ class LegKind(ABC):
         The parameter that a file gives for this kind alone; empty: the kind of all other files.
     position, rate, effort : Named
         Quantities of the drive.
+    effort_signs : tuple of str
+        What a positive effort is called, and a negative one.
+    extremes : tuple of str
+        What the smallest and the largest position are called.
     position_limits : tuple of str
         Limits of the drive's position, the smallest and the largest.
     rate_limit, effort_limit : str
         Limits of its rate, and of its effort, to which commands are clipped.
     lever_limit : str
         Limit of the smallest lever by its largest value; empty: levers do not change.
-    end_limits : tuple of str
-        Limits of forces that differ between the ends of a leg: a result has the larger one.
+    joint_force, joint_force_limit : str
+        Key of the force along the line in tables, and its limit.
+    ends_differ : bool
+        Whether this force differs between the ends of a leg: a result has the larger one.
     commands : str
         Field of ``stewart_output`` with the efforts to command.
     width : int
         Numbers in a row of results: those of ``stewart_result`` up to the last of this kind.
+    wrong_units : tuple
+        Efforts in another unit, by those in the right one, and in words.
+    right_sign : str
+        What a positive effort must do.
+    gear : str
+        What is between motor and drive.
     ratio : str
         The parameter without which there are no motors; empty: none is needed.
     own : tuple of str
@@ -86,6 +116,8 @@ class LegKind(ABC):
         Masses and moments in the regressor, in the order of the columns in C.
     massless : mapping
         Values of parameters with which the legs and the drives have no mass.
+    solids : tuple of Solid
+        Cylinders of which pictures of a leg consist.
     parts : tuple of str
         Names of the two bodies of a leg, from the base on.
     joints : tuple of str
@@ -107,19 +139,27 @@ class LegKind(ABC):
     position: Named
     rate: Named
     effort: Named
+    effort_signs: tuple[str, str]
+    extremes: tuple[str, str]
     position_limits: tuple[str, str]
     rate_limit: str
     effort_limit: str
     lever_limit: str = ''
-    end_limits: tuple[str, ...] = ()
+    joint_force: str = 'joint_force'
+    joint_force_limit: str
+    ends_differ: bool = False
     commands: str
     width: int = _RESULT['joint_forces'].stop
+    right_sign: str
+    gear: str
     ratio: str = ''
+    wrong_units: tuple[tuple[float, str], ...]
     own: tuple[str, ...]
     foreign: tuple[str, ...]  # the ``own`` of other kinds
     fields: Mapping[str, str]
     masses: tuple[LegMass, ...]
     massless: Mapping[str, Any]
+    solids: tuple[Solid, ...]
     parts: tuple[str, str]
     joints: tuple[str, str]
     elements: tuple[str, ...]
@@ -174,8 +214,34 @@ class LegKind(ABC):
         """Return the values of ``masses`` (n, 6), SI units."""
 
     @abstractmethod
+    def relative_changes(self, parameters: Parameters) -> Sequence[Array]:
+        """
+        Return how ``mass_values`` (n, 6) change with what may be uncertain of a leg's parts.
+
+        Each for a relative change of a mass, a center of mass, or an inertia.
+        """
+
+    @abstractmethod
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the lines of force in poses (...); not finite where a leg does not reach."""
+
+    def anchors(self, parameters: Parameters, positions: Array) -> Array | None:
+        """
+        Return where the lines of force begin (..., 6, 3), base frame [m]; None: at base joints.
+
+        positions (..., 6): of the drives.
+        """
+        del parameters, positions
+        return None
+
+    @abstractmethod
+    def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
+                     ) -> tuple[Placed, ...]:
+        """
+        Return where the ``solids`` are.
+
+        joints (6, 3): platform joints, base frame [m]. positions (6,): of the drives.
+        """
 
     def missing_distances(self, parameters: Parameters, position: Array, rotation: Array,
                           ) -> Array | None:

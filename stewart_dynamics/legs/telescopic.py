@@ -12,13 +12,15 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.legs import telescopic_tree as tree
-from stewart_dynamics.legs.kind import LegKind, LegMass, Named
+from stewart_dynamics.legs.kind import LegKind, LegMass, Named, Placed, Solid, STANDARD_G
 from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, SLIDE, UNIVERSAL
-from stewart_dynamics.legs.tree import LegBranch
+from stewart_dynamics.legs.tree import BARREL, LegBranch, ROD
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
+
+_OF_LENGTH = 0.5  # of the cylinder in pictures, of the leg's length without a shortest one
 
 
 class Telescopic(LegKind):
@@ -27,11 +29,15 @@ class Telescopic(LegKind):
     name = 'telescopic'
     position = Named('length', 'lengths', 'm')
     rate = Named('rate', 'rates', 'm/s', '+ extends')
-    effort = Named('force', 'forces', 'N', '+ pushes')
+    effort = Named('force', 'forces', 'N', '+ pushes', 'pulls')
+    effort_signs, extremes = ('push', 'pull'), ('shortest', 'longest')
     position_limits = 'limits.length_min', 'limits.length_max'
     rate_limit, effort_limit = 'limits.velocity_max', 'limits.force_max'
+    joint_force_limit = 'limits.joint_force_max'
     commands = 'forces'
-    ratio = 'actuator.screw_lead'
+    ratio, gear, right_sign = 'actuator.screw_lead', 'screw', '+ must push'
+    wrong_units = ((1e-3, 'kN in place of N'), (1.0 / STANDARD_G, 'kgf in place of N'),
+                   (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
     own = ('legs.cylinder.', 'legs.piston.', 'actuator.reflected_mass', 'actuator.screw_lead',
            'geometry.zero_length', 'geometry.base_joint_axes', 'geometry.base_outline',
            'geometry.platform_outline', 'limits.length_', 'limits.velocity_max',
@@ -53,6 +59,7 @@ class Telescopic(LegKind):
         'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.piston.mass': 0.0,
         'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
         'drive.screw_inertia': None}
+    solids = Solid('cylinders', BARREL), Solid('pistons', ROD)
     parts, joints = tree.PARTS, (UNIVERSAL, SLIDE)
     elements = ('actuator.reflected_mass', 'actuator.viscous_friction',
                 'actuator.coulomb_friction', *(
@@ -72,12 +79,38 @@ class Telescopic(LegKind):
             part.mass, part.mass * part.center_of_mass,
             part.inertia + part.mass * part.center_of_mass ** 2)])
 
+    def relative_changes(self, parameters: Parameters) -> list[Array]:
+        """Return changes of cylinder and piston; the mass of a cylinder alone has no effect."""
+        found: list[Array] = []
+        none = np.zeros(6)
+        for n, part in enumerate(parameters.legs.parts.values()):
+            first, mass = part.mass * part.center_of_mass, n * part.mass
+            turning = part.inertia + part.mass * part.center_of_mass ** 2 - part.inertia
+            for change in ((mass, first, turning), (none, first, 2.0 * turning),
+                           (none, none, part.inertia)):
+                rows = np.zeros((6, 6))
+                rows[3 * n:3 * n + 3] = change
+                found.append(rows)
+        return found
+
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the legs: (1), (2)."""
         arms = joint_arms(rotation, parameters.geometry.platform_joints)
         vectors = position[..., None, :] + arms - parameters.geometry.base_joints
         lengths = np.linalg.norm(vectors, axis=-1)
         return Lines(lengths, vectors / lengths[..., None], arms)
+
+    def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
+                     ) -> tuple[Placed, ...]:
+        """Return cylinders that begin at the base joints, and pistons from joint to joint."""
+        base, shortest = parameters.geometry.base_joints, parameters.limits.length_min
+        vectors = joints - base
+        along = vectors / positions[:, None]
+        barrels = _OF_LENGTH * positions
+        if shortest is not None:
+            barrels = np.minimum(tree.BARREL_LENGTH * shortest, positions)
+        return (Placed(base + 0.5 * barrels[:, None] * along, along, barrels),
+                Placed(base + 0.5 * vectors, along, positions))
 
     def leg_mass(self, parameters: Parameters, at: Lines) -> Array:
         """Return M_i = m2 s s^T - (I_e / L^2 + m_ce) skew(s)^2."""

@@ -14,11 +14,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import shown
-from stewart_dynamics.legs.mechanism import (
-    Chain, DescriptionError, LegJoint, MechanismBody, Placement, SLIDE, UNIVERSAL)
-from stewart_dynamics.legs.reading import (
+from stewart_dynamics.legs.leg_reading import (
     center_of, left_out, limits_of, platform_joint, say_gap, say_outside, slender_body, SMALL,
     TURNS)
+from stewart_dynamics.legs.mechanism import (
+    Chain, DescriptionError, LegJoint, MechanismBody, Placement, SLIDE, UNIVERSAL)
 from stewart_dynamics.legs.tree import BARREL, LegBranch, LegLink, ROD, rod_shape, VisualShape
 
 if TYPE_CHECKING:

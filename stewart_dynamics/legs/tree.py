@@ -76,4 +76,3 @@ def rod_shape(color: str, radius: float, length: float, sign: float = 1.0) -> Vi
     """Return a cylinder that begins at the origin, along z or against it."""
     return VisualShape('cylinder', color, np.array([0.0, 0.0, 0.5 * sign * length]), np.eye(3),
                        radius, length)
-

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import math
 from typing import Any, NamedTuple
 
@@ -25,6 +25,7 @@ from stewart_dynamics.parameters.table import OUTLINES, PARAMETERS, Parameters
 # in loads on the platform; or is one of the motors.
 POSE, TWIST, LOAD, MOTOR = 'pose', 'twist', 'load', 'motor'
 MINIMUM, MAXIMUM, LARGEST = 'MINIMUM', 'MAXIMUM', 'LARGEST'  # senses, as in STEWART_LIMITS
+_MEASURES: dict[str, Any] = {MINIMUM: np.negative, MAXIMUM: np.positive, LARGEST: np.abs}
 NO_COLUMNS = slice(0)  # of quantities that are not in a row of results
 # Relative tolerance of limit checks, above rounding errors.
 TOLERANCE = CONSTANTS['LIMIT_TOLERANCE']
@@ -67,6 +68,12 @@ class Limit(NamedTuple):
         return self.sense == MINIMUM
 
     @property
+    def measure(self) -> Callable[[Array], Array]:
+        """Return a function of values that is the greater, the nearer they are to the limit."""
+        measure: Callable[[Array], Array] = _MEASURES[self.sense]
+        return measure
+
+    @property
     def clips(self) -> bool:
         """Return whether published values are clipped to it; others follow limits.action."""
         return bool(self.bit & CODES['STEWART_CLIPPED'])
@@ -78,6 +85,7 @@ LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX, JOINT_FORCE_MAX = (
 BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX = OF_JOINTS = (
     'limits.base_joint_angle_max', 'limits.platform_joint_angle_max')
 CLEARANCE_MIN = 'limits.leg_clearance_min'
+LEVER_MIN = 'limits.lever_min'
 TORQUE_MAX, TORQUE_SPEED, SPEED_MAX, TEMPERATURE_RISE_MAX = (
     'drive.torque_max', 'drive.torque_speed', 'drive.speed_max', 'drive.temperature_rise_max')
 JUMP = 'jump'
@@ -123,6 +131,7 @@ class LimitNames(NamedTuple):
     legs: tuple[str, ...]  # without those of motors
     poses: tuple[str, ...]
     results: tuple[str, ...]  # whose quantities are in a row of results
+    known: tuple[str, ...]  # whose quantities are always in a row of outputs
     rates: tuple[str, ...]
     loads: tuple[str, ...]
     usual: tuple[str, ...]  # whose quantities are shown where they are not given, too
@@ -134,6 +143,7 @@ def _names_of(kind: LegKind) -> LimitNames:
     results = tuple(name for name in legs if LIMITS[name].columns.stop <= RESULT)
     return LimitNames(
         legs, tuple(name for name in legs if LIMITS[name].depends == POSE), results,
+        (*results, *(name for name in legs if name == LEVER_MIN)),
         tuple(name for name in results if LIMITS[name].depends == TWIST),
         tuple(name for name in results if LIMITS[name].depends == LOAD),
         tuple(name for name in results if LIMITS[name].usual))
@@ -144,11 +154,16 @@ _BY_KIND = {kind.name: _names_of(kind) for kind in KINDS}
 
 def limits_of(parameters: Parameters) -> LimitNames:
     """Return the names of the limits that the kind of legs of a hexapod can have."""
-    return _BY_KIND[parameters.leg_kind.name]
+    return limits_of_kind(parameters.leg_kind)
+
+
+def limits_of_kind(kind: LegKind) -> LimitNames:
+    """Return the names of the limits that a kind of legs can have."""
+    return _BY_KIND[kind.name]
 
 
 # Of programs that know telescopic legs alone.
-OF_LEGS, OF_POSES, OF_RESULTS, OF_RATES, OF_LOADS, USUAL = _BY_KIND['telescopic']
+OF_LEGS, OF_POSES, OF_RESULTS, _, OF_RATES, OF_LOADS, USUAL = _BY_KIND['telescopic']
 OF_MOTORS = tuple(name for name, each in LIMITS.items() if each.depends == MOTOR)
 TORQUE_CONTINUOUS = 'drive.torque_continuous'
 """The torque that a motor can hold without end: may be exceeded for a short time."""

@@ -373,9 +373,10 @@ class StewartPlatform:
             if codes[at] == forward_kinematics.SINGULAR:
                 raise SingularityError(f'{where}a singular pose after {steps[at]} iterations: '
                                        'give a guess farther from singularities')
+            why = forward_kinematics.failure(steps[at], residuals[at])
+            most = f', must be at most {forward_kinematics.RESIDUAL:g}'
             raise PoseError(
-                f'{where}did not converge: residual {residuals[at]:.3g} m after '
-                f'{steps[at]} iterations, must be at most {forward_kinematics.RESIDUAL:g}')
+                f'{where}{why}' + most * bool(residuals[at] > forward_kinematics.RESIDUAL))
         return Pose.of_rows(rows[:, POSE].reshape(*shape, POSE.stop).copy())
 
     def twist(self, pose: Pose | Motion, rates: ArrayLike) -> Array:

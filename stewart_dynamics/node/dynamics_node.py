@@ -45,8 +45,9 @@ from stewart_dynamics.setpoints.input_messages import WRENCH
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import (
-    DROPPED, NOT_EXCLUSIVE, OUT_OF_RANGE, Rejection, stamp_words)
+    DROPPED, NOT_EXCLUSIVE, Rejection, stamp_words)
 from stewart_dynamics.setpoints.step import Batch, EXCEEDING, FIRST, Outputs, Step
+from stewart_dynamics.setpoints.unanswered import unanswered
 
 
 # If more setpoints wait, the node has fallen behind, and only the newest is answered.
@@ -135,7 +136,8 @@ class DynamicsNode(ManagedNode[Parameters]):
             WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
             planned.INPUT: self._on_trajectory}, self._publish_again)
         self._kept.clear()
-        self._diagnostics_publisher = DiagnosticsPublisher(self, self._topics, self._log)
+        self._diagnostics_publisher = DiagnosticsPublisher(
+            self, self._topics, self._log, self._settings)
         self._exclusive = self._settings.setpoint.exclusive
 
     def close_topics(self) -> None:
@@ -219,7 +221,8 @@ class DynamicsNode(ManagedNode[Parameters]):
         outputs = self._models.step(setpoint, self._state)
         self._state = outputs.state
         if not len(outputs.stamps):
-            self._setpoints.reject('setpoint', OUT_OF_RANGE, stamp_words(int(setpoint.stamps[0])))
+            for reason in unanswered(self._models.step.parameters, setpoint, outputs):
+                self._setpoints.reject('setpoint', *reason)
             return
         publishers = self._topics.publishers
         answered = {topic: messages.tobytes()

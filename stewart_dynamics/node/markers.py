@@ -17,8 +17,7 @@ from struct import pack, Struct
 import numpy as np
 from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.description.hexapod import Color, COLORS
-from stewart_dynamics.legs.telescopic_tree import BARREL_LENGTH
-from stewart_dynamics.legs.tree import BALL, BARREL, PLATE, ROD
+from stewart_dynamics.legs.tree import BALL, PLATE
 from stewart_dynamics.mechanics.frames.rotation import quaternion_of
 from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
 from stewart_dynamics.mechanics.limits import Exceedance
@@ -49,7 +48,6 @@ _AXIS, _LINE = 1.2, 0.02
 _HEAVY = 0.2  # the ball at the centre of mass
 _TEXT_SIZE, _TEXT_ABOVE = 0.11, 1.4
 _NAME_OUTSIDE = 0.15  # relative to the base's size
-_OF_LENGTH = 0.5  # of the cylinder, of the leg's length where limits.length_min is not set
 
 # Lifetime of markers [s]: setpoints sent by hand typically arrive once per second. At a lower
 # visualization_rate it is two periods, at most one day: a Duration is limited to 68 years.
@@ -69,10 +67,10 @@ class Markers:
     """
     Writes the markers of a hexapod.
 
-    A leg is a piston, from joint to joint, in a cylinder that begins at the base joint. Their
-    colour goes from white to vermillion as the leg pushes with up to ``limits.force_max``, to blue
-    as it pulls; where there is no such limit, with up to the largest of the six forces. They are
-    grey where no forces are published. The platform is grey blue, yellow while the singularity
+    A leg consists of the cylinders of its kind, ``LegKind.solids``. Their colour goes from white
+    to vermillion with an effort of the leg's drive of up to its limit, to blue with a negative
+    one; where there is no such limit, of up to the largest of the six efforts. They are grey where
+    no efforts are published. The platform is grey blue, yellow while the singularity
     warning is on, and vermillion inside ``singularity.stop_condition`` and at a crossing. A purple
     ball is the centre of mass of platform and payload, a green one that of the payload.
 
@@ -87,10 +85,10 @@ class Markers:
         self._names = parameters.joints
         geometry = parameters.geometry
         self._base, self._platform = geometry.base_joints, geometry.platform_joints
-        self._bounds = parameters.limits.force_max
-        self._shortest = parameters.limits.length_min
+        self._kind = kind = parameters.leg_kind
+        self._bounds: Array | None = parameters[kind.effort_limit]
         size = mean_radius(self._platform)
-        self._diameters = np.repeat([2.0 * BARREL * size, 2.0 * ROD * size], 6)
+        self._diameters = np.repeat([2.0 * solid.radius * size for solid in kind.solids], 6)
         self._text_above = _TEXT_ABOVE * size
         self._frame = parameters.base_frame
         rate = parameters.visualization_rate
@@ -125,8 +123,8 @@ class Markers:
             *([self._marker('platform', 4, Marker.SPHERE_LIST, _PAYLOAD, (_HEAVY * size,) * 3,
                             parameters.payload.body.center[None])]
               if parameters.payload.mass > 0.0 else [])]
-        self._bodies = [self._marker('cylinders' if n < 6 else 'pistons', n % 6, Marker.CYLINDER,
-                                     NO_FORCE) for n in range(12)]
+        self._bodies = [self._marker(solid.name, n, Marker.CYLINDER, NO_FORCE)
+                        for solid in kind.solids for n in range(6)]
         self._text = self._marker('singularity', 0, Marker.TEXT_VIEW_FACING, _WHITE, text_size)
         _COUNT.pack_into(self._body, len(LITTLE_ENDIAN), len(self._stamps))
         # The text has variable length: the bytes before and after it are kept.
@@ -148,54 +146,52 @@ class Markers:
         level, message = singularity_state(outputs.rows[0].tolist(), self._parameters)
         _put_color(body, self._plate, PLATFORM[level])
 
-        vectors = motion[:3] + self._platform @ rotation.T - self._base
-        forces = outputs.forces[0].tolist()
-        colors = 2 * self._colors(forces)
+        joints = motion[:3] + self._platform @ rotation.T
+        efforts = outputs.efforts[0].tolist()
+        colors = len(self._kind.solids) * self._colors(efforts)
         for at, numbers, color in zip(
-                self._bodies, self._cylinders(vectors, outputs.lengths[0]), colors, strict=True):
+                self._bodies, self._cylinders(joints, outputs.drive_positions[0]), colors,
+                strict=True):
             _POSE_AND_SCALE.pack_into(body, at, *numbers)
             _put_color(body, at, color)
 
         x, y, z = motion[:3]
         _POSE.pack_into(body, self._text, x, y, z + self._text_above, 0.0, 0.0, 0.0, 1.0)
-        text = self._words(outputs, exceedances, forces, message).encode() + b'\x00'
+        text = self._words(outputs, exceedances, efforts, message).encode() + b'\x00'
         return b''.join((body, _COUNT.pack(len(text)), text, bytes(-len(text) % 4), self._end))
 
-    def _cylinders(self, vectors: Array, lengths: Array) -> list[list[float]]:
-        """Return pose and scale of six cylinders and of six pistons, ten numbers each."""
-        along = vectors / lengths[:, None]
-        barrels = _OF_LENGTH * lengths
-        if self._shortest is not None:
-            barrels = np.minimum(BARREL_LENGTH * self._shortest, lengths)
-        numbers = np.zeros((12, 10))
-        numbers[:6, :3] = self._base + 0.5 * barrels[:, None] * along
-        numbers[6:, :3] = self._base + 0.5 * vectors
+    def _cylinders(self, joints: Array, positions: Array) -> list[list[float]]:
+        """Return pose and scale of six cylinders for each solid, ten numbers each."""
+        placed = self._kind.place_solids(self._parameters, joints, positions)
+        along = np.concatenate([each.directions for each in placed])
+        numbers = np.zeros((len(along), 10))
+        numbers[:, :3] = np.concatenate([each.centers for each in placed])
         # The rotation that turns z into a direction on the shortest way. The one up is taken of
         # the two that a cylinder has: half the way is far from upside down then.
         up = np.copysign(1.0, along[:, 2:]) * along
         half = np.sqrt(0.5 + 0.5 * up[:, 2])
-        numbers[:, 3] = np.tile(-0.5 * up[:, 1] / half, 2)
-        numbers[:, 4] = np.tile(0.5 * up[:, 0] / half, 2)
-        numbers[:, 6] = np.tile(half, 2)
+        numbers[:, 3] = -0.5 * up[:, 1] / half
+        numbers[:, 4] = 0.5 * up[:, 0] / half
+        numbers[:, 6] = half
         numbers[:, 7] = numbers[:, 8] = self._diameters
-        numbers[:6, 9], numbers[6:, 9] = barrels, lengths
+        numbers[:, 9] = np.concatenate([each.lengths for each in placed])
         rows: list[list[float]] = numbers.tolist()
         return rows
 
-    def _full(self, forces: Sequence[float]) -> Sequence[float]:
-        """Return the force of each leg at which its colour is saturated."""
+    def _full(self, efforts: Sequence[float]) -> Sequence[float]:
+        """Return the effort of each drive at which its colour is saturated."""
         if self._bounds is not None:
             bounds: list[float] = self._bounds.tolist()
             return bounds
-        return [max(map(abs, forces)) or 1.0] * 6
+        return [max(map(abs, efforts)) or 1.0] * 6
 
-    def _colors(self, forces: Sequence[float]) -> list[Color]:
-        if math.isnan(forces[0]):
+    def _colors(self, efforts: Sequence[float]) -> list[Color]:
+        if math.isnan(efforts[0]):
             return [NO_FORCE] * 6
-        return [_between(NO_LOAD, PUSH if force > 0.0 else PULL, abs(force) / full)
-                for force, full in zip(forces, self._full(forces), strict=True)]
+        return [_between(NO_LOAD, PUSH if effort > 0.0 else PULL, abs(effort) / full)
+                for effort, full in zip(efforts, self._full(efforts), strict=True)]
 
-    def _words(self, outputs: Outputs, exceedances: Sequence[Exceedance], forces: Sequence[float],
+    def _words(self, outputs: Outputs, exceedances: Sequence[Exceedance], efforts: Sequence[float],
                message: str) -> str:
         lines = [f'det(J) {outputs.determinants[0]:.4g} m^3, '
                  f'condition number {outputs.conditions[0]:.4g}']
@@ -204,10 +200,12 @@ class Markers:
         legs = sorted({exceedance.leg for exceedance in exceedances})
         if legs:
             lines.append('limits exceeded: ' + ', '.join(self._names[leg] for leg in legs))
-        if not math.isnan(forces[0]):
-            full = self._full(forces)
-            force = 'limits.force_max' if len(set(full)) > 1 else f'{full[0]:.4g} N'
-            lines.append(f'vermillion: push, blue: pull, saturated at {force}')
+        if not math.isnan(efforts[0]):
+            full = self._full(efforts)
+            limit = (self._kind.effort_limit if len(set(full)) > 1
+                     else f'{full[0]:.4g} {self._kind.effort.unit}')
+            push, pull = self._kind.effort_signs
+            lines.append(f'vermillion: {push}, blue: {pull}, saturated at {limit}')
         return '\n'.join(lines)
 
     # -- the message that is made once ------------------------------------------------------

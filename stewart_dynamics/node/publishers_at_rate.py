@@ -22,17 +22,14 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.limits import OF_POSES
+from stewart_dynamics.mechanics.limits import limits_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node.diagnostics.levels import OK, Status
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.node.topics import DIAGNOSTICS, NodeTopics, TRAVEL_RATE
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import RepeatedLog
-from stewart_dynamics.setpoints.output_messages import LEG_FORCES, LEG_STATES
-
-# The topics for controllers; diagnostics give the number of their subscribers.
-_READ = LEG_STATES, LEG_FORCES
+from stewart_dynamics.setpoints.output_messages import LEG_STATES, LegTopics
 
 # Directions in the order of the message: each of x y z rx ry rz to minus, then to plus.
 _DIRECTIONS = np.stack([-np.eye(6), np.eye(6)], axis=1).reshape(12, 6)
@@ -42,8 +39,7 @@ _SWITCH = 2e-4  # after which another thread of Python may go on [s]
 _LAYOUT = MultiArrayLayout(dim=[
     MultiArrayDimension(label='x y z rx ry rz', size=6, stride=12),
     MultiArrayDimension(label='minus plus', size=2, stride=2)])
-NO_LIMIT = (f'~/travel: none of {", ".join(OF_POSES)} is set: it ends '
-            'at singularity.stop_condition alone')
+NO_LIMIT = '~/travel: none of {} is set: it ends at singularity.stop_condition alone'
 
 
 class PublisherAtRate:
@@ -96,18 +92,19 @@ class TravelPublisher(PublisherAtRate):
     def use(self, parameters: Parameters) -> None:
         """Use other parameters from now on."""
         self._parameters = parameters
+        self._values: Future[Array] | None = None
         self._capability = self._thread.submit(
             lambda: Capability(StewartPlatform(parameters)))
-        self._values: Future[Array] | None = None
 
     def look(self) -> str:
         """Check whether there is a subscriber; return a notice where no limit is set, once."""
         self._read = self._publisher.get_subscription_count() > 0
         if not self._read:
             return ''
-        unlimited = all(self._parameters[name] is None for name in OF_POSES)
+        limits = limits_of(self._parameters).poses
+        unlimited = all(self._parameters[name] is None for name in limits)
         said, self._said = self._said, True
-        return NO_LIMIT if unlimited and not said else ''
+        return NO_LIMIT.format(', '.join(limits)) if unlimited and not said else ''
 
     def note(self, *data: Any) -> None:
         """Note a row of motion."""
@@ -142,8 +139,11 @@ def _travel(capability: Future[Capability], motion: Sequence[float]) -> Array:
 class DiagnosticsPublisher:
     """Publishes and logs reports."""
 
-    def __init__(self, node: Node, topics: NodeTopics, log: RepeatedLog) -> None:
+    def __init__(self, node: Node, topics: NodeTopics, log: RepeatedLog,
+                 parameters: Parameters) -> None:
         self._node = node
+        # The topics for controllers; diagnostics give the number of their subscribers.
+        self._read = LEG_STATES, LegTopics.of(parameters.leg_kind).efforts
         self._topics = topics
         self._log = log
         # The first one takes milliseconds: rclpy loads the type support.
@@ -156,7 +156,7 @@ class DiagnosticsPublisher:
             (node.get_name(), node.get_namespace()))
         diagnostics.setpoints.found(
             self._topics.writers(),
-            {topic: publishers[topic].get_subscription_count() for topic in _READ},
+            {topic: publishers[topic].get_subscription_count() for topic in self._read},
             f'{namesakes} nodes are named {node.get_fully_qualified_name()}'
             if namesakes > 1 else '')
         statuses, lines = diagnostics.report(time.monotonic())

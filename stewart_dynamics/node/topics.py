@@ -10,7 +10,7 @@ as well (``make docs``).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple
@@ -25,6 +25,8 @@ from stewart_dynamics.description.model import JOINT_STATES, MODEL_TYPES, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
+from stewart_dynamics.legs import KINDS
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.node.tasks import LENGTH
 from stewart_dynamics.parameters.table import Parameters
@@ -35,8 +37,8 @@ from stewart_dynamics.setpoints.input_messages import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
     SOURCES, TWIST, WRENCH)
 from stewart_dynamics.setpoints.output_messages import (
-    DETERMINANT, LEG_FORCES, LEG_LENGTHS, LEG_STATES, MOTOR_STATES, MOTOR_TORQUES, MOTOR_TYPES,
-    OUTPUT_TYPES, WARNING)
+    DETERMINANT, LEG_STATES, LegTopics, MOTOR_STATES, MOTOR_TORQUES, MOTOR_TYPES, output_types,
+    WARNING)
 from stewart_dynamics.setpoints.sample_joining import WAITING
 
 DIAGNOSTICS, MARKERS, PAYLOAD, TRAVEL = '/diagnostics', 'markers', 'payload', 'travel'
@@ -86,17 +88,30 @@ SUBSCRIBED = (
 )
 
 
-def _output(name: str, meaning: str, parameter: str = '', latched: bool = False) -> Topic:
-    return Topic(name, (OUTPUT_TYPES | MOTOR_TYPES)[name], meaning, parameter,
+def _output(name: str, meaning: str, parameter: str = '', latched: bool = False,
+            kind: LegKind = KINDS[0]) -> Topic:
+    return Topic(name, (output_types(kind) | MOTOR_TYPES)[name], meaning, parameter,
                  latched=latched, depth=1 if latched else 10)
 
 
+def _of_legs(kind: LegKind) -> Iterator[Topic]:
+    """Yield the topics that are named by the quantities of a kind of legs."""
+    position, effort, topics = kind.position, kind.effort, LegTopics.of(kind)
+    yield _output(topics.positions, f'six {position.field}, {position.unit}', kind.marker,
+                  kind=kind)
+    yield _output(topics.efforts, f'six {effort.field}, {effort.unit}, {effort.positive}; remap '
+                  'it to the `commands` of an effort controller', kind.marker, kind=kind)
+
+
+_OTHER_STATES = ''.join(
+    f'; with `{kind.marker}` {kind.position.name}, {kind.rate.name} and {kind.effort.name}, and '
+    f'there is no {" or ".join(f"`~/{topic}`" for topic in LegTopics.of(KINDS[0]))}'
+    for kind in KINDS[1:])
+
 PUBLISHED = (
     _output(LEG_STATES, 'name, position (length - `geometry.zero_length`), velocity and effort '
-            '(force) of the six legs'),
-    _output(LEG_LENGTHS, 'six lengths, m'),
-    _output(LEG_FORCES, 'six forces, N, + pushes; remap it to the `commands` of an effort '
-            'controller'),
+            f'(force) of the six legs{_OTHER_STATES}'),
+    *(topic for kind in KINDS for topic in _of_legs(kind)),
     _output(DETERMINANT, 'det(J), m^3'),
     _output(WARNING, 'true near and at a [singularity](theory.md#singularity); with the first '
             'setpoint and on every change, latched (transient local)', latched=True),
@@ -177,6 +192,8 @@ class NodeTopics:
         there = {MARKERS: parameters.visualization_rate > 0.0, TF: parameters.publish_tf}
         there[JOINT_STATES] = there[MARKERS]
         there[MOTOR_STATES] = there[MOTOR_TORQUES] = bool(parameters.drives)
+        there |= {topic: kind is parameters.leg_kind
+                  for kind in KINDS for topic in LegTopics.of(kind)}
         for topic in PUBLISHED:
             if there.get(topic.name, True):
                 self._publish(topic, publish_again)

@@ -491,9 +491,16 @@ class TrajectoryGroup(ParameterGroup):
         choices=(IGNORE, CHECK, PREPEND))
 
 
+OF_DRIVES, MOTOR_TORQUES, MOTOR_CURRENTS = EFFORTS = (
+    'drives', 'motor_torques', 'motor_currents')
+
+
 class ExternalWrenchGroup(ParameterGroup):
     """The wrench on the platform that measured efforts show."""
 
+    efforts: str = declare(
+        'what the efforts on ~/measured_legs are: those of the drives, as ~/leg_states has them, '
+        'torques of the motors, or their currents', '', OF_DRIVES, choices=EFFORTS)
     cutoff: float = declare(
         'cut-off frequency of the low-pass filter on ~/external_wrench', 'Hz', 10.0, minimum=0.0,
         above=True, while_active=True)
@@ -704,6 +711,7 @@ class Parameters(ParameterSet):
         if (broken := broken_rule(self.structure)) is not None:
             raise ParameterError(f'{source}: {self._broken_words(*broken)}')
         self._complete_derived()
+        self._check_efforts(source)
         self._carry_payload(source)
 
     def _broken_words(self, rule: Rule, where: int) -> str:
@@ -747,6 +755,22 @@ class Parameters(ParameterSet):
         for field, name in self.leg_kind.fields.items():
             if self[name] is None and np.isfinite(legs[field]).all():
                 self._complete(name, legs[field].copy())
+
+    def _check_efforts(self, source: str) -> None:
+        """Check that measured efforts can be taken as those of the drives."""
+        efforts = self.external_wrench.efforts
+        needed = {OF_DRIVES: [], MOTOR_TORQUES: [self.leg_kind.ratio],
+                  MOTOR_CURRENTS: [self.leg_kind.ratio, 'drive.torque_constant']}[efforts]
+        for name in filter(None, needed):
+            if self[name] is None:
+                raise ParameterError(
+                    f'{source}: {name}: not set: needed by external_wrench.efforts: {efforts}')
+        back = self.drive.back_driving_efficiency
+        if efforts != OF_DRIVES and back is not None and not back.min() > 0.0:
+            raise ParameterError(
+                f'{source}: external_wrench.efforts: {efforts}: drive.back_driving_efficiency, '
+                f'{back.min():g}, must be more than 0: the torque at a self-locking '
+                f'{self.leg_kind.gear} does not show its load')
 
     def _check_reflected_mass(self, source: str) -> None:
         """Check the reflected inertia that is given against the one that follows from drive.*."""

@@ -27,7 +27,7 @@ from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.limits import (
-    LIMITS, OF_JOINTS, OF_LEGS, Quantity)
+    LIMITS, limits_of, limits_of_kind, OF_JOINTS, Quantity)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, PARTS_OF_WRENCH,
     POSE, POSITION, ROTATION)
@@ -35,7 +35,8 @@ from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
-from stewart_dynamics.replay.summary import Answered, margin_key, unit_key
+from stewart_dynamics.replay.summary import (
+    Answered, key_of, kind_in, LegKeys, margin_key, unit_key)
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
     base64_of, link, link_to_other, page, plotly_script)
@@ -50,9 +51,11 @@ from stewart_dynamics.setpoints.rejections import stamp_of
 from stewart_dynamics.whole_file import FilesOfFolder, write_files
 
 FOLDER = Path(__file__).with_name('templates')
-# Where the numbers of the moving platform are in a frame; angles in degrees.
-_FRAME = {'position': (0, 3), 'rotation': (3, 12), 'angles': (12, 15), 'lengths': (15, 21),
-          'forces': (21, 27)}
+# Where the numbers of the moving platform are in a frame; angles in degrees. Anchors: where the
+# lines of force of the legs begin, if they move.
+_FRAME = {'position': (0, 3), 'rotation': (3, 12), 'angles': (12, 15), 'positions': (15, 21),
+          'efforts': (21, 27)}
+_ANCHORS = {'anchors': (27, 45)}
 # Maximum number of listed times of one kind, the first ones.
 _MOST_TIMES = 20
 
@@ -75,7 +78,10 @@ class Report:
         self._curves = Curves(timeout)
         self._places: dict[str, slice] = {}
         self._spectrum = Spectrum(6, timeout, folder)
-        self._frames = Frames(max(end for _, end in _FRAME.values()))
+        self._kind = kind = parameters.leg_kind
+        moving = kind.anchors(parameters, np.zeros(6)) is not None
+        self._frame = _FRAME | (_ANCHORS if moving else {})
+        self._frames = Frames(max(end for _, end in self._frame.values()))
         self._compared = Curves(timeout) if measured else None
         self._places_compared: dict[str, slice] = {}
         self._angles: Array = np.zeros((1, 3))
@@ -86,7 +92,7 @@ class Report:
         """Add setpoints, at least one, with their breakdown."""
         seconds, setpoints, outputs, base_wrenches, powers, breakdown = block
         assert breakdown is not None
-        motions, forces = setpoints.motions, outputs.demanded_forces
+        motions, positions = setpoints.motions, outputs.drive_positions
         if self._first is None:
             self._first = motions[0, POSITION].copy()
         angles = self._continued(np.degrees(to_euler(motions[:, ROTATION].reshape(-1, 3, 3))))
@@ -97,7 +103,7 @@ class Report:
             'angular_velocity': np.degrees(motions[:, ANGULAR_VELOCITY]),
             'acceleration': motions[:, LINEAR_ACCELERATION],
             'angular_acceleration': np.degrees(motions[:, ANGULAR_ACCELERATION]),
-            **{LIMITS[name].quantity.key: outputs.results[:, LIMITS[name].columns]
+            **{LIMITS[name].quantity.key: outputs.rows[:, LIMITS[name].columns]
                for name in self._plotted},
             'powers': powers,
             'determinant': outputs.determinants[:, None],
@@ -117,8 +123,10 @@ class Report:
             self._operating.add(motors)
         self._places = _add(self._curves, seconds, quantities)
         self._spectrum.add(seconds, base_wrenches.T)
-        self._frames.add(seconds, np.concatenate(
-            [motions[:, POSE], angles, outputs.lengths, forces], axis=1))
+        anchors = self._kind.anchors(self._parameters, positions)
+        self._frames.add(seconds, np.concatenate([
+            motions[:, POSE], angles, positions, outputs.demanded_efforts,
+            *([] if anchors is None else [anchors.reshape(len(seconds), -1)])], axis=1))
 
     def add_measured(
             self, seconds: Array, measured: Array, computed: Array, wrench: Array) -> None:
@@ -154,7 +162,8 @@ class Report:
             quantities={name: limit.quantity for name, limit in LIMITS.items()},
             units={name: each.unit or '' for name, each in PARAMETERS.items()},
             most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS_OF_WRENCH,
-            unit_key=unit_key, percent=PERCENT, bandwidth=bandwidth, **_response_charts(followed),
+            kind=self._kind, keys=LegKeys.of(self._kind), key_of=key_of, unit_key=unit_key,
+            percent=PERCENT, bandwidth=bandwidth, **_response_charts(followed),
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
             if self._operating and known else {})
         write_files({path: text})
@@ -194,11 +203,14 @@ class Report:
             'begin': times[0] if len(times) else 0.0,
             'end': times[-1] if len(times) else 0.0,
             'legs': self._legs,
+            'position': {'name': self._kind.position.name, 'unit': self._kind.position.unit},
+            'effort': {'name': self._kind.effort.name, 'unit': self._kind.effort.unit,
+                       'positive': self._kind.effort.positive},
             'forceColors': FORCE_COLORS,
             'baseJoints': p.geometry.base_joints,
             'platformJoints': p.geometry.platform_joints,
             'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8'),
-                       'places': _FRAME},
+                       'places': self._frame},
             'warnings': singularity['warnings_from_to_s'],
             'crossings': singularity['crossings_at_s'],
             'contacts': [[each['from_s'], each['to_s']] for each in (
@@ -255,7 +267,7 @@ def margin_columns(parameters: Parameters) -> list[tuple[Quantity, str, list[str
     Those that are not usual are left out if no limit is given; of joints, none at both ends.
     """
     limits: dict[Quantity, list[str]] = {}
-    for limit in OF_LEGS:
+    for limit in limits_of(parameters).legs:
         together = OF_JOINTS if limit in OF_JOINTS else (limit,)
         if LIMITS[limit].usual or any(parameters[name] is not None for name in together):
             limits.setdefault(LIMITS[limit].quantity, []).append(limit)
@@ -265,7 +277,8 @@ def margin_columns(parameters: Parameters) -> list[tuple[Quantity, str, list[str
 def smallest_margins(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the smallest margins of all quantities with a limit, each with its leg."""
     found = []
-    for quantity in dict.fromkeys(LIMITS[limit].quantity for limit in OF_LEGS):
+    names = limits_of_kind(kind_in(summary['legs'])).legs
+    for quantity in dict.fromkeys(LIMITS[limit].quantity for limit in names):
         if margins := values_of(summary['legs'], margin_key(quantity)):
             value, joint = min(margins, key=FIRST)
             found.append({'name': quantity.name, 'value': value, 'unit': quantity.unit,

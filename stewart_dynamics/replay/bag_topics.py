@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from stewart_dynamics.bags.recording import joined, Recording, topics_in
-from stewart_dynamics.description.model import MODEL_TYPES
+from stewart_dynamics.description.model import JOINT_STATES
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.messages import type_names
@@ -18,11 +18,10 @@ from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.response.recorded_response import MEASURED, MEASURED_POSE
 from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
-from stewart_dynamics.setpoints.output_messages import LEG_STATES, MOTOR_TYPES, OUTPUT_TYPES
+from stewart_dynamics.setpoints.output_messages import LEG_STATES, MOTOR_STATES
 
 # JointState topics that the node publishes, under its name: computed, never measured legs.
-_COMPUTED = tuple(name for name, kind in (OUTPUT_TYPES | MOTOR_TYPES | MODEL_TYPES).items()
-                  if kind == type_names.JOINT_STATE)
+_COMPUTED = LEG_STATES, MOTOR_STATES, JOINT_STATES
 _OF_BASE = tuple(dict.fromkeys(key for keys in inputs.BASE_SOURCES.values() for key in keys))
 
 

@@ -6,9 +6,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import csv
-from functools import partial
+from functools import cache, partial
 import io
 import math
 import os
@@ -17,14 +17,15 @@ from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from stewart_dynamics.bags.find import FLEET_PAGE, FLEET_TABLE
-from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, LENGTH_MAX, LIMITS, OF_JOINTS, OF_LOADS, OF_RATES)
+from stewart_dynamics.legs import KINDS
+from stewart_dynamics.legs.kind import LegKind
+from stewart_dynamics.mechanics.limits import LIMITS, limits_of_kind
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.legs_table import harmless
 from stewart_dynamics.replay.motor_loads import needed
 from stewart_dynamics.replay.replay_options import LIMIT_MET
 from stewart_dynamics.replay.statements import MEASURED, MISSING, needed_words, statements
-from stewart_dynamics.replay.summary import margin_key
+from stewart_dynamics.replay.summary import key_of, kind_in, LegKeys, margin_key
 from stewart_dynamics.reporting.pages import page
 from stewart_dynamics.reporting.results_folder import REPORT_PAGE
 from stewart_dynamics.whole_file import FilesOfFolder
@@ -88,11 +89,11 @@ def _of_legs(key: str, choose: Callable[..., Any], part: str = '',
     return of
 
 
-def _of_worst_force(what: int) -> Callable[[dict[str, Any]], Cell]:
-    """Return a function for the largest force: 0 its value, 1 its leg, 2 its time."""
+def _of_worst_effort(keys: LegKeys, what: int) -> Callable[[dict[str, Any]], Cell]:
+    """Return a function for the largest effort: 0 its value, 1 its leg, 2 its time."""
     def of(summary: dict[str, Any]) -> Cell:
-        peaks = [(leg['force_peak_n'], name, leg['force_peak_at_s'])
-                 for name, leg in summary['legs'].items() if leg['force_peak_n'] is not None]
+        peaks = [(leg[keys.effort_peak], name, leg[keys.effort_at])
+                 for name, leg in summary['legs'].items() if leg[keys.effort_peak] is not None]
         cell: Cell = max(peaks, key=lambda peak: abs(peak[0]))[what] if peaks else None
         return cell
 
@@ -113,53 +114,73 @@ def _rejected(summary: dict[str, Any]) -> int:
     return sum(each['count'] for each in summary['rejected'])
 
 
-COLUMNS = (
-    Column('bag', 'bag', number=False),
-    Column('code', ''),
-    Column('result', 'result', number=False),
-    Column('reason', 'reason', number=False),
-    Column('complete', '', '', _value('complete'), number=False),
-    Column('setpoints', 'setpoints', '', _value('setpoints', 'answered')),
-    Column('duration_s', 'duration', 's', _value('setpoints', 'duration_s')),
-    Column('force_worst_n', 'worst force', 'N', _of_worst_force(0), size=True),
-    Column('force_worst_leg', 'of leg', '', _of_worst_force(1), number=False),
-    Column('force_worst_at_s', 'at', 's', _of_worst_force(2)),
-    *(Column(margin_key(quantity), f'{quantity.name} margin', quantity.unit,
-             _of_legs(margin_key(quantity), min), optional=not LIMITS[limit].usual)
-      for limit in (*OF_LOADS, LENGTH_MAX, *OF_RATES, *OF_JOINTS, CLEARANCE_MIN)
-      for quantity in [LIMITS[limit].quantity]),
-    Column('limits_exceeded', 'limits exceeded', '', _exceeded, number=False),
-    Column('force_rms_n', 'RMS force', 'N', _of_legs('force_rms_n', max)),
-    Column('power_peak_w', 'peak power', 'W', _of_legs('power_peak_w', _largest), size=True),
-    *(Column(key, head, unit, _of_legs(key, min if 'margin' in key else _largest, 'motors'),
-             size='peak' in key, optional=True) for key, head, unit in (
-        ('torque_rms_n_m', 'RMS motor torque', 'N m'),
-        ('torque_peak_n_m', 'peak motor torque', 'N m'),
-        ('speed_peak_rad_s', 'peak motor speed', 'rad/s'),
-        ('torque_margin_n_m', 'torque margin', 'N m'),
-        ('torque_continuous_margin_n_m', 'continuous torque margin', 'N m'),
-        ('speed_margin_rad_s', 'speed margin', 'rad/s'),
-        ('temperature_rise_max_k', 'temperature rise of windings', 'K'))),
-    *(Column(f'bus_{key}', head, unit, _value('motors', 'bus', key), optional=True)
-      for key, head, unit in (
-        ('power_peak_w', 'bus power', 'W'),
-        ('regenerated_peak_w', 'power flowing back', 'W'),
-        ('energy_per_cycle_j', 'energy of a cycle', 'J'))),
-    Column('determinant_nearest_m3', 'det(J) nearest 0', 'm³',
-           _value('singularity', 'determinant_nearest_m3'), size=True),
-    Column('crossings', 'crossings', '', _value('singularity', 'crossings')),
-    Column('condition_max', 'condition number', 'max', _value('singularity', 'condition_max')),
-    Column('warnings', 'warnings', '', _value('singularity', 'warnings')),
-    Column('rejected', 'rejected', '', _rejected),
-    Column('residual_rms_n', 'residual RMS', 'N',
-           _of_legs('residual_rms_n', max, 'measured'), optional=True),
-    Column('residual_share', 'residual share', '',
-           _value('measured', 'residual_share'), optional=True),
-    Column('contacts', 'contacts', '', _value('measured', 'contacts', 'count'), optional=True),
-    Column('measured', 'measured', '', _value('measured', 'headline'), number=False,
-           optional=True),
-    Column('results', '', number=False),
-)
+@cache
+def columns_of(kind: LegKind) -> tuple[Column, ...]:
+    """Return the columns of bags of hexapods with a kind of legs."""
+    keys, limits, name, unit = (
+        LegKeys.of(kind), limits_of_kind(kind), kind.effort.name, kind.effort.unit)
+    residual, of_motors = key_of('residual_rms', unit), _prefix_of_motors(kind)
+    return (
+        Column('bag', 'bag', number=False),
+        Column('code', ''),
+        Column('result', 'result', number=False),
+        Column('reason', 'reason', number=False),
+        Column('complete', '', '', _value('complete'), number=False),
+        Column('setpoints', 'setpoints', '', _value('setpoints', 'answered')),
+        Column('duration_s', 'duration', 's', _value('setpoints', 'duration_s')),
+        Column(key_of(f'{name}_worst', unit), f'worst {name}', unit, _of_worst_effort(keys, 0),
+               size=True),
+        Column(f'{name}_worst_leg', 'of leg', '', _of_worst_effort(keys, 1), number=False),
+        Column(f'{name}_worst_at_s', 'at', 's', _of_worst_effort(keys, 2)),
+        *(Column(margin_key(quantity), f'{quantity.name} margin', quantity.unit,
+                 _of_legs(margin_key(quantity), min), optional=not LIMITS[limit].usual)
+          for limit in (*limits.loads, kind.position_limits[1], *limits.rates, *(
+              each for each in limits.poses if each not in kind.position_limits))
+          for quantity in [LIMITS[limit].quantity]),
+        Column('limits_exceeded', 'limits exceeded', '', _exceeded, number=False),
+        Column(keys.effort_rms, f'RMS {name}', unit, _of_legs(keys.effort_rms, max)),
+        Column('power_peak_w', 'peak power', 'W', _of_legs('power_peak_w', _largest), size=True),
+        *(Column(of_motors + key, head, unit, _of_legs(
+            key, min if 'margin' in key else _largest, 'motors'),
+            size='peak' in key, optional=True) for key, head, unit in (
+            ('torque_rms_n_m', 'RMS motor torque', 'N m'),
+            ('torque_peak_n_m', 'peak motor torque', 'N m'),
+            ('speed_peak_rad_s', 'peak motor speed', 'rad/s'),
+            ('torque_margin_n_m', 'torque margin', 'N m'),
+            ('torque_continuous_margin_n_m', 'continuous torque margin', 'N m'),
+            ('speed_margin_rad_s', 'speed margin', 'rad/s'),
+            ('temperature_rise_max_k', 'temperature rise of windings', 'K'))),
+        *(Column(f'bus_{key}', head, unit, _value('motors', 'bus', key), optional=True)
+          for key, head, unit in (
+            ('power_peak_w', 'bus power', 'W'),
+            ('regenerated_peak_w', 'power flowing back', 'W'),
+            ('energy_per_cycle_j', 'energy of a cycle', 'J'))),
+        Column('determinant_nearest_m3', 'det(J) nearest 0', 'm³',
+               _value('singularity', 'determinant_nearest_m3'), size=True),
+        Column('crossings', 'crossings', '', _value('singularity', 'crossings')),
+        Column('condition_max', 'condition number', 'max', _value('singularity', 'condition_max')),
+        Column('warnings', 'warnings', '', _value('singularity', 'warnings')),
+        Column('rejected', 'rejected', '', _rejected),
+        Column(residual, 'residual RMS', unit, _of_legs(residual, max, 'measured'), optional=True),
+        Column('residual_share', 'residual share', '',
+               _value('measured', 'residual_share'), optional=True),
+        Column('contacts', 'contacts', '', _value('measured', 'contacts', 'count'), optional=True),
+        Column('measured', 'measured', '', _value('measured', 'headline'), number=False,
+               optional=True),
+        Column('results', '', number=False),
+    )
+
+
+def _prefix_of_motors(kind: LegKind) -> str:
+    """Return what precedes keys of motors, where drives have torques of their own."""
+    return 'motor_' if kind.effort.unit == 'N m' else ''
+
+
+def _kind_of(rows: Iterable[Row]) -> LegKind:
+    """Return the kind of legs of bags, which are of one hexapod."""
+    kinds = (kind for row in rows for kind in KINDS
+             if key_of(f'{kind.effort.name}_worst', kind.effort.unit) in row)
+    return next(kinds, KINDS[0])
 
 
 def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, Cell]:
@@ -178,7 +199,8 @@ def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, C
             cells['result'] = NOTHING_ANSWERED
         elif code == DONE and _rejected(summary) > _REJECTED_SHARE * answered:
             cells['result'] = REJECTED
-        cells.update({column.key: column.of(summary) for column in COLUMNS if column.of})
+        cells.update({column.key: column.of(summary)
+                      for column in columns_of(kind_in(summary['legs'])) if column.of})
     return cells
 
 
@@ -197,8 +219,9 @@ def write_fleet(output: Path, rows: Sequence[Row], files: FilesOfFolder | None =
     text = io.StringIO(newline='')
     # All text in quotes: spreadsheets that separate by semicolon do not split names.
     table = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC)
-    table.writerow([column.key for column in COLUMNS])
-    table.writerows([_harmless(column.key, row.get(column.key)) for column in COLUMNS]
+    columns = columns_of(_kind_of(rows))
+    table.writerow([column.key for column in columns])
+    table.writerows([_harmless(column.key, row.get(column.key)) for column in columns]
                     for row in rows)
     files = files or FilesOfFolder(output, replace=True)
     files.write({FLEET_TABLE: text.getvalue(), FLEET_PAGE: _page(output, rows)})
@@ -209,7 +232,8 @@ def listed_results(table: Path) -> set[str] | None:
     try:
         with table.open(newline='', encoding='utf-8') as file:
             reader = csv.DictReader(file)
-            if reader.fieldnames != [column.key for column in COLUMNS]:
+            known = [[column.key for column in columns_of(kind)] for kind in KINDS]
+            if list(reader.fieldnames or ()) not in known:
                 return None
             return {row['results'].removeprefix('./') for row in reader if row['results']}
     except (OSError, ValueError, csv.Error):
@@ -233,8 +257,12 @@ def _harmless(key: str, cell: Cell) -> Cell:
 
 
 def _page(output: Path, rows: Sequence[Row]) -> str:
-    shown = [column for column in COLUMNS if column.head and not (
+    shown = [column for column in columns_of(_kind_of(rows)) if column.head and not (
         column.optional and all(row.get(column.key) is None for row in rows))]
+    prefix = _prefix_of_motors(_kind_of(rows))
+    loads = [{key.removeprefix(prefix): cell for key, cell in row.items()
+              if key.startswith(prefix)} for row in rows
+             if f'{prefix}torque_peak_n_m' in row and not row['warnings']]
     fleet = {
         'software': next((row['software'] for row in rows if 'software' in row), ''),
         'columns': [{'key': column.key, 'head': column.head, 'unit': column.unit,
@@ -242,8 +270,7 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
         # The colour of a row.
         'codes': [LIMIT_MET if row['result'] == REJECTED else row['code'] for row in rows],
         'severity': SEVERITY,
-        'motor': needed_words(needed(row for row in rows if 'torque_peak_n_m' in row
-                                     and not row['warnings'])),
+        'motor': needed_words(needed(loads)),
         'links': [_link(output, row) for row in rows],
         'rows': [[_shown(row.get(column.key)) for column in shown] for row in rows],
     }

@@ -16,8 +16,9 @@ import orjson
 
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.replay.summary import Answered
+from stewart_dynamics.replay.summary import Answered, key_of
 from stewart_dynamics.reporting.results_folder import LEGS_CSV, LEGS_PARQUET
 
 # Beginnings of text that spreadsheet programs execute.
@@ -26,17 +27,19 @@ _FORMULA = ('=', '+', '-', '@', '\t', '\r', '\n')
 _ENDS = (b',0\n', b',1\n')
 
 
-def column_names(legs: Sequence[str], joint_angles: bool = False, clearance: bool = False,
-                 joint_forces: bool = False) -> list[str]:
+def column_names(kind: LegKind, legs: Sequence[str], joint_angles: bool = False,
+                 clearance: bool = False, joint_forces: bool = False) -> list[str]:
     """Return the names of the columns; a name ends with its unit."""
-    limited = (*(('joint_force_n',) if joint_forces else ()),
+    position, rate, effort = (
+        key_of(each.name, each.unit) for each in (kind.position, kind.rate, kind.effort))
+    limited = (*((f'{kind.joint_force}_n',) if joint_forces else ()),
                *(('base_joint_angle_rad', 'platform_joint_angle_rad') if joint_angles else ()),
                *(('clearance_m',) if clearance else ()))
     return ['stamp_ns', 'time_s',
             *(f'position_{axis}_m' for axis in 'xyz'),
             *(f'orientation_{part}' for part in 'xyzw'),
             *(f'{leg}_{quantity}' for quantity in (
-                'length_m', 'rate_m_s', 'force_n', 'demanded_force_n') for leg in legs),
+                position, rate, effort, f'demanded_{effort}') for leg in legs),
             'determinant_m3', 'determinant_rate_m3_s', 'condition',
             *(f'base_force_{axis}_n' for axis in 'xyz'),
             *(f'base_moment_{axis}_n_m' for axis in 'xyz'),
@@ -48,6 +51,7 @@ class Table(ABC):
     A file with one row per setpoint.
 
     folder: folder of the file.
+    kind, legs: kind of the legs, and their names.
     quasi_static: velocities are not known: columns that depend on them are empty.
     joint_angles, clearance, joint_forces: there are columns of the angles of the joints, of the
         clearance between the legs, and of the forces in rods and joints.
@@ -56,11 +60,12 @@ class Table(ABC):
     FILE = ''
 
     def __init__(
-            self, folder: Path, legs: Sequence[str], quasi_static: bool = False,
+            self, folder: Path, kind: LegKind, legs: Sequence[str], quasi_static: bool = False,
             joint_angles: bool = False, clearance: bool = False, joint_forces: bool = False,
             ) -> None:
         self._quasi_static, self._joint_forces = quasi_static, joint_forces
-        self._open(folder / self.FILE, column_names(legs, joint_angles, clearance, joint_forces))
+        self._open(folder / self.FILE, column_names(
+            kind, legs, joint_angles, clearance, joint_forces))
 
     def write(self, block: Answered) -> None:
         """Write the rows of N setpoints."""
@@ -73,7 +78,7 @@ class Table(ABC):
             determinant_rates = np.full_like(determinant_rates, np.nan)
         numbers = np.column_stack([
             block.seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
-            outputs.lengths, rates, outputs.forces, outputs.demanded_forces,
+            outputs.drive_positions, rates, outputs.efforts, outputs.demanded_efforts,
             outputs.determinants, determinant_rates, outputs.conditions, block.base_wrenches,
             outputs.joint_forces[:, :6 if self._joint_forces else 0], outputs.joint_angles,
             outputs.clearances])

@@ -47,8 +47,9 @@ from stewart_dynamics.response.recorded_response import (
 from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
-from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection, stamp_of
+from stewart_dynamics.setpoints.rejections import Rejection, stamp_of
 from stewart_dynamics.setpoints.step import Batch, FIRST, Step
+from stewart_dynamics.setpoints.unanswered import unanswered
 from stewart_dynamics.whole_file import write_json
 
 VERSION = 1  # version of summary.json; increased when the meaning of a key changes
@@ -282,7 +283,8 @@ class _Run:
                 {'topic': each.topic, 'text': each.text,
                  'first_at_s': _since_first(each.first, values['setpoints'])}
                 for each in mistakes],
-            'measured': measured and {'headline': measured_headline(measured), **measured},
+            'measured': measured and {
+                'headline': measured_headline(measured, self._parameters.leg_kind), **measured},
             'response': self.followed and self.followed.values,
             'parameters': self._parameters.plain(),
         }
@@ -311,9 +313,9 @@ class _Run:
             return 0
         outputs = self._step(setpoints, self._state)
         self._state = outputs.state
-        rejected = len(setpoints.stamps) - len(outputs.stamps)
-        if rejected:
-            self._setpoints.reject('setpoint', OUT_OF_RANGE, '', rejected)
+        for reason in unanswered(self._parameters, setpoints, outputs):
+            self._setpoints.reject('setpoint', *reason)
+        if len(outputs.stamps) < len(setpoints.stamps):
             setpoints = setpoints.chosen(outputs.answered)
         if not len(setpoints.stamps):
             return 0

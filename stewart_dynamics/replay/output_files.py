@@ -52,10 +52,10 @@ class OutputFiles:
                  quasi_static: bool, inputs: Sequence[str]) -> None:
         model = _model(parameters, options.node.strip('/'))
         self._table = kind_of_table(options.parquet)(
-            folder, parameters.joints, quasi_static,
+            folder, parameters.leg_kind, parameters.joints, quasi_static,
             any(parameters[name] is not None for name in OF_JOINTS),
             parameters.limits.leg_clearance_min is not None,
-            parameters.limits.joint_force_max is not None)
+            parameters[parameters.leg_kind.joint_force_limit] is not None)
         self._bag = OutputBag(folder / OUTPUT_BAG, options.node, OutputMessages(parameters), model,
                               parameters.visualization_rate, inputs)
 

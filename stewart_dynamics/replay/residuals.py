@@ -34,7 +34,7 @@ from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader, MISSING_JOINTS, NUMBERS_END
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.summary import COMPONENTS, unit_key
+from stewart_dynamics.replay.summary import COMPONENTS, key_of, unit_key
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
 from stewart_dynamics.reporting.block_statistics import Extreme
 from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
@@ -110,7 +110,7 @@ class Comparison:
     """
 
     def __init__(self, parameters: Parameters, of_motors: bool = False) -> None:
-        self._parameters = parameters
+        self._parameters, self._unit = parameters, parameters.leg_kind.effort.unit
         self._losses = of_motors and has_losses(parameters)
         self._ratio = motor_ratio(parameters)
         self._platform = StewartPlatform(parameters)
@@ -128,7 +128,7 @@ class Comparison:
 
     def add_setpoints(self, seconds: Array, setpoints: Batch, outputs: Outputs) -> Compared:
         """Add setpoints, see Summary.add; return the compared setpoints."""
-        columns = [seconds, setpoints.motions[:, POSE], outputs.demanded_forces]
+        columns = [seconds, setpoints.motions[:, POSE], outputs.demanded_efforts]
         if self._losses:
             motors = Motors.of_rows(outputs.motors)
             columns += [motors.speeds / self._ratio, motors.accelerations / self._ratio]
@@ -214,12 +214,12 @@ class Comparison:
     def _of_all_legs(self) -> dict[str, float | None]:
         number = 6 * self._legs.count
         residual, measured = np.sum(self._legs.squares), np.sum(self._sums.measured_squares)
-        return {'residual_rms_n': np.sqrt(residual / number) if number else None,
+        return {key_of('residual_rms', self._unit): np.sqrt(residual / number) if number else None,
                 'residual_share': np.sqrt(residual / measured) if measured else None}
 
     def _leg(self, leg: int) -> dict[str, float | None]:
         number = self._legs.count
-        named = self._legs.named(leg, 'residual_', 'n')
+        named = self._legs.named(leg, 'residual_', unit_key(self._unit))
         sums = self._sums
         measured_squares, squares = sums.measured_squares[leg], sums.computed_squares[leg]
         measured_total, total = sums.measured[leg], sums.computed[leg]
@@ -231,8 +231,8 @@ class Comparison:
         constant = not spread > 1e-20 * squares * measured_squares * number ** 2
         correlation = None if constant else np.clip(
             (products * number - total * measured_total) / np.sqrt(spread), -1.0, 1.0)
-        return {**named, 'measured_rms_n': rms[0], 'computed_rms_n': rms[1],
-                'correlation': correlation}
+        return {**named, key_of('measured_rms', self._unit): rms[0],
+                key_of('computed_rms', self._unit): rms[1], 'correlation': correlation}
 
     def _contacts(self, load_known: bool) -> dict[str, Any]:
         number = max(self._legs.count, 1)

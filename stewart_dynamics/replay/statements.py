@@ -15,12 +15,13 @@ import math
 from operator import itemgetter
 from typing import Any, NamedTuple
 
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.limits import (
-    BASE_ANGLE_MAX, Exceedance, LENGTH_MAX, LIMITS as ALL_LIMITS, LOAD, OF_MOTORS,
+    BASE_ANGLE_MAX, Exceedance, LEVER_MIN, LIMITS as ALL_LIMITS, LOAD, OF_MOTORS,
     PLATFORM_ANGLE_MAX, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.replay.motor_loads import NEEDS
-from stewart_dynamics.replay.summary import margin_key, unit_key
+from stewart_dynamics.replay.summary import kind_in, margin_key, unit_key
 from stewart_dynamics.reporting.pages import fixed
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, Rejection
 
@@ -44,8 +45,8 @@ _CARDS = {
     (MOTORS, MOTOR_LIMITS): {
         'none': 'Motors', 'good': 'Motors are large enough',
         'warn': 'Motors may be too small', 'bad': 'Limits of the motors are exceeded'},
-    (MEASURED,): {'none': 'Measured forces', 'good': 'Measured forces',
-                  'warn': 'Measured forces differ'}}
+    (MEASURED,): {'none': 'Measured {efforts}', 'good': 'Measured {efforts}',
+                  'warn': 'Measured {efforts} differ'}}
 # Maximum number of reasons of rejection.
 _LISTED = 3
 # Measured forces differ if the residual's RMS is a larger part of theirs.
@@ -76,12 +77,12 @@ def statements(summary: Summary) -> list[Statement]:
 
 def motion_statements(summary: Summary) -> list[Statement]:
     """Return the statements about the answered setpoints, for which no bag is needed."""
-    points = summary['setpoints']
+    points, kind = summary['setpoints'], kind_in(summary['legs'])
     found = [
         *_inputs(summary), *_limits(summary), *_joints(summary['legs']),
         *_loads(summary['base_wrench']), *_motors(summary),
-        *_singularity(summary['singularity'])] if points['answered'] else []
-    return [*found, *_answered(points)]
+        *_singularity(summary['singularity'], kind)] if points['answered'] else []
+    return [*found, *_answered(points, kind.effort.field)]
 
 
 class Card(NamedTuple):
@@ -95,13 +96,14 @@ class Card(NamedTuple):
 def cards(summary: Summary) -> dict[str, Card]:
     """Return the cards of the report by their first topic."""
     about, found, shown = statements(summary), {}, set[Statement]()
+    efforts = kind_in(summary['legs']).effort.field
     for topics, titles in _CARDS.items():
         on_it = [each for each in about if each.topic in topics]
         level = max((each.level for each in on_it), key=LEVELS.index, default='none')
         # Limits that are held are listed on one card alone.
         listed = [each for each in on_it if each.level != 'good' or each not in shown]
         shown.update(on_it)
-        found[topics[0]] = Card(level, titles[level], listed)
+        found[topics[0]] = Card(level, titles[level].format(efforts=efforts), listed)
     return found
 
 
@@ -112,19 +114,19 @@ def plural(number: int, what: str) -> str:
 
 def values_of(legs: Mapping[str, Summary], key: str) -> list[tuple[float, str]]:
     """Return the known values of the legs, each with its leg."""
-    return [(leg[key], name) for name, leg in legs.items() if leg[key] is not None]
+    return [(leg[key], name) for name, leg in legs.items() if leg.get(key) is not None]
 
 
 FIRST = itemgetter(0)
 
 
-def _answered(points: Summary) -> Iterator[Statement]:
+def _answered(points: Summary, efforts: str) -> Iterator[Statement]:
     yield Statement(READING, 'good', f'{plural(points["answered"], "setpoint")} in '
                                      f'{points["duration_s"]:.2f} s{_interruptions(points)}')
     if unknown := points['base_unknown']:
         yield Statement(
             READING, 'warn', f'{BASE_NOT_KNOWN} in {plural(unknown, "setpoint")}, first',
-            points['base_unknown_first_at_s'], 'base_force', ': they have no forces')
+            points['base_unknown_first_at_s'], 'base_force', f': they have no {efforts}')
 
 
 def _messages(summary: Summary) -> Iterator[Statement]:
@@ -163,16 +165,19 @@ def _limits(summary: Summary) -> Iterator[Statement]:
             name, 0, each['worst'], each['bound']).excess)
         others = f' and {plural(len(of_legs) - 1, "other leg")}' if len(of_legs) > 1 else ''
         quantity = ALL_LIMITS[name].quantity
-        at_worst = ' at that speed' if name == TORQUE_SPEED else ''
+        unit = f' {quantity.unit}' if quantity.unit else ''
+        at_worst = (' at that speed' if name == TORQUE_SPEED
+                    else ', near a dead centre' if name == LEVER_MIN else '')
         yield Statement(
-            _topic(name), 'bad', f'{name}, {most["bound"]:g} {quantity.unit}{at_worst}, exceeded '
-            f'by {most["leg"]}{others}: {most["worst"]:.6g} {quantity.unit} at worst, first',
+            _topic(name), 'bad', f'{name}, {most["bound"]:g}{unit}{at_worst}, exceeded '
+            f'by {most["leg"]}{others}: {most["worst"]:.6g}{unit} at worst, first',
             min(each['first_at_s'] for each in of_legs), quantity.key)
     if points['jumps']:
+        kind = kind_in(summary['legs'])
         yield Statement(
             LIMITS, 'bad', f'{plural(points["jumps"], "jump")}, first',
-            points['jumps_first_at_s'], ALL_LIMITS[LENGTH_MAX].quantity.key,
-            ': the legs cannot follow within limits.velocity_max')
+            points['jumps_first_at_s'], ALL_LIMITS[kind.position_limits[1]].quantity.key,
+            f': the legs cannot follow within {kind.rate_limit}')
     for name in summary['limits_not_checked']:
         why = ': velocities are not known; --differentiate computes them from the poses'
         causes = ((summary['singularity']['unsolved'], 'J_inv cannot be solved'),
@@ -300,15 +305,16 @@ def needed_words(needed: Summary) -> str:
         words)
 
 
-def _singularity(found: Summary) -> Iterator[Statement]:
+def _singularity(found: Summary, kind: LegKind) -> Iterator[Statement]:
+    efforts = kind.effort.field
     crossings, spans = found['crossings_at_s'], found['warnings_from_to_s']
     if crossings:
         more = f' and {plural(found["crossings"] - 1, "time")} more' if len(crossings) > 1 else ''
         yield Statement(SINGULARITY, 'bad', 'det(J) crossed zero', crossings[0], 'determinant',
-                        f'{more}: forces grow without bound there')
+                        f'{more}: {efforts} grow without bound there')
     if found['unsolved']:
         yield Statement(SINGULARITY, 'bad', 'J_inv cannot be solved in '
-                        f'{plural(found["unsolved"], "setpoint")}: they have no forces')
+                        f'{plural(found["unsolved"], "setpoint")}: they have no {efforts}')
     if spans:
         begun, ended = spans[0]
         ahead = [time - begun for time in crossings
@@ -319,7 +325,7 @@ def _singularity(found: Summary) -> Iterator[Statement]:
             (f', {ahead[0]:.2f} s before the crossing' if ahead else '')
             + f'{more}, for {found["warning_s"]:.2f} s in all')
     if found['suppressed']:
-        yield Statement(SINGULARITY, 'none', 'forces were suppressed in '
+        yield Statement(SINGULARITY, 'none', f'{efforts} were suppressed in '
                         f'{plural(found["suppressed"], "setpoint")}')
     if not crossings:
         yield Statement(SINGULARITY, 'good', 'det(J) did not cross zero')

@@ -11,16 +11,18 @@ on how they are split into blocks. docs/summary.md defines each number.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.legs import KINDS
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import (
-    Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, OF_LEGS, OF_LOADS, OF_RATES,
-    POSE, Quantity, USUAL, VELOCITY_MAX)
+    Exceedance, LIMITS, Limits, limits_of, POSE, Quantity)
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
@@ -29,10 +31,6 @@ from stewart_dynamics.reporting.block_statistics import (
     Crossings, Exceeded, Extreme, finite, FIRST, Integral, longest_step, Warnings, with_nan)
 from stewart_dynamics.setpoints.step import Batch, Outputs
 
-# Values of a leg that are not known from poses alone.
-_OF_VELOCITY = (
-    'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
-    'power_mean_w', 'energy_driving_j', 'energy_braking_j')
 _AT_REST = ('gravity', 'wrench', 'base motion')
 # Units of the components of a wrench.
 COMPONENTS = {f'{part}_{axis}': unit for part, unit in PARTS_OF_WRENCH.items() for axis in 'xyz'}
@@ -41,12 +39,52 @@ _BASE_WRENCH = PARTS_OF_WRENCH | COMPONENTS
 
 def margin_key(quantity: Quantity) -> str:
     """Return the key, in a leg of summary.json, of the margin of a quantity from its limits."""
-    return f'{quantity.key}_margin_{unit_key(quantity.unit)}'
+    return key_of(f'{quantity.key}_margin', quantity.unit)
+
+
+def key_of(name: str, unit: str) -> str:
+    """Return a key of summary.json, which ends with the unit: torque_peak_n_m."""
+    return f'{name}_{unit_key(unit)}' if unit else name
 
 
 def unit_key(unit: str) -> str:
     """Return a unit as keys of summary.json end with it: n_m, rad_s."""
     return unit.lower().replace('/', '_').replace(' ', '_')
+
+
+class LegKeys(NamedTuple):
+    """Keys of a leg in summary.json that are named by the quantities of its drive."""
+
+    position_min: str
+    position_max: str
+    position_margin: str
+    rate_peak: str
+    rate_at: str
+    rate_margin: str
+    effort_peak: str
+    effort_at: str
+    effort_rms: str
+    effort_published: str
+    effort_margin: str
+
+    @classmethod
+    def of(cls, kind: LegKind) -> LegKeys:
+        """Return the keys of a kind of legs."""
+        position, rate, effort = (
+            (each.name, unit_key(each.unit)) for each in (kind.position, kind.rate, kind.effort))
+        return cls(
+            f'{position[0]}_min_{position[1]}', f'{position[0]}_max_{position[1]}',
+            f'{position[0]}_margin_{position[1]}',
+            f'{rate[0]}_peak_{rate[1]}', f'{rate[0]}_peak_at_s', f'{rate[0]}_margin_{rate[1]}',
+            f'{effort[0]}_peak_{effort[1]}', f'{effort[0]}_peak_at_s',
+            f'{effort[0]}_rms_{effort[1]}', f'{effort[0]}_published_peak_{effort[1]}',
+            f'{effort[0]}_margin_{effort[1]}')
+
+
+def kind_in(legs: Mapping[str, Mapping[str, Any]]) -> LegKind:
+    """Return the kind of the legs in summary.json."""
+    keys = next(iter(legs.values()), {})
+    return next((kind for kind in KINDS if LegKeys.of(kind).effort_peak in keys), KINDS[0])
 
 
 class Answered(NamedTuple):
@@ -59,13 +97,13 @@ class Answered(NamedTuple):
     base_wrenches: Array  # wrench of the hexapod on its base (N, 6) [N, N m]; nan: not known
     powers: Array  # mechanical powers of the drives (N, 6) [W]
     breakdown: Array | None = None
-    """The demanded forces by source (N, 7, 6): sample, source, leg [N]."""
+    """The demanded efforts by source (N, 7, 6): sample, source, leg."""
 
 
 def powers_of(platform: StewartPlatform, setpoints: Batch, outputs: Outputs) -> Array:
     """Return the mechanical powers of the drives (N, 6) [W]."""
     with np.errstate(over='ignore', invalid='ignore'):
-        powers: Array = outputs.demanded_forces * platform.drive_rates(
+        powers: Array = outputs.demanded_efforts * platform.drive_rates(
             setpoints.motions, outputs.rates)
     return powers
 
@@ -82,10 +120,11 @@ class Summary:
         self._quasi_static = quasi_static
         self._legs = parameters.joints
         self._timeout = parameters.setpoint.timeout
+        self._kind, self._names = parameters.leg_kind, limits_of(parameters)
         self._limits = Limits(parameters)
         self._exceeded = {
-            name: Exceeded(LIMITS[name].minimum)
-            for name in self._limits.bounds if not (quasi_static and name in OF_RATES)}
+            name: Exceeded(LIMITS[name].measure) for name in self._limits.bounds
+            if not (quasi_static and name in self._names.rates)}
         self._held: list[Answered] = []
         self._gap: float | None = None
         self._stamps: tuple[int, int] | None = None
@@ -96,10 +135,9 @@ class Summary:
         self._jumped_at: float | None = None
         self._seconds = self._gap_seconds = 0.0
         # of the quantity of each limit, the value nearest to it or farthest beyond it
-        self._peaks = {
-            name: Extreme(6, np.negative if LIMITS[name].minimum else np.abs) for name in OF_LEGS}
+        self._peaks = {name: Extreme(6, LIMITS[name].measure) for name in self._names.legs}
         self._published, self._power = Extreme(6, np.abs), Extreme(6, np.abs)
-        # squares of the forces; driving power; braking power
+        # squares of the efforts; driving power; braking power
         self._means = Integral(18)
         self._nearest = Extreme(1, lambda det: -np.abs(det))
         self._condition = Extreme(1, np.positive)
@@ -139,7 +177,7 @@ class Summary:
     def _add(self, block: Answered) -> None:
         seconds, setpoints, outputs, base_wrenches, power, breakdown = block
         steps = self._steps(seconds, setpoints)
-        demanded = outputs.demanded_forces
+        demanded = outputs.demanded_efforts
         without = with_nan(demanded)
         unknown = ~setpoints.base_known
         unsolved = without & ~(unknown & outputs.solvable)
@@ -153,12 +191,12 @@ class Summary:
                 self._jumped_at = float(seconds[outputs.jumped.argmax()])
         self._without_force += int(without.sum())
         self._unsolved += int(unsolved.sum())
-        self._suppressed += int((with_nan(outputs.forces) & ~without).sum())
+        self._suppressed += int((with_nan(outputs.efforts) & ~without).sum())
         self._base_wrench.add(seconds, steps, base_wrenches)
         with np.errstate(over='ignore', invalid='ignore'):
             self._means.add(steps, np.concatenate(
                 (demanded ** 2, np.maximum(power, 0.0), np.maximum(-power, 0.0)), axis=1))
-        self._published.add(seconds, outputs.forces)
+        self._published.add(seconds, outputs.efforts)
         self._power.add(seconds, power)
         values = outputs.values()
         for name, peak in self._peaks.items():
@@ -204,7 +242,7 @@ class Summary:
         limits = [entry for name, exceeded in self._exceeded.items()
                   for entry in exceeded.entries(name, self._legs)]
         not_checked = [name for name in self._limits.bounds if name not in self._exceeded
-                       or name in OF_LOADS and self._without_force]
+                       or name in self._names.loads and self._without_force]
         motors = None
         if self._motors is not None:
             limits += self._motors.exceeded(self._legs)
@@ -236,14 +274,17 @@ class Summary:
         squares, driving, braking = self._means.mean.reshape(3, 6)[:, leg]
         _, energy_driving, energy_braking = self._means.values.reshape(3, 6)[:, leg]
         solved = self._without_force < self._answered
-        peaks = self._peaks
+        peaks, kind, keys = self._peaks, self._kind, LegKeys.of(self._kind)
+        lowest, highest = kind.position_limits
         found: dict[str, float | None] = {
-            'length_min_m': finite(peaks[LENGTH_MIN].values[leg]),
-            'length_max_m': finite(peaks[LENGTH_MAX].values[leg]),
-            **peaks[VELOCITY_MAX].named(leg, 'rate_peak', 'm_s'),
-            **peaks[FORCE_MAX].named(leg, 'force_peak', 'n'),
-            'force_rms_n': finite(math.sqrt(squares)),
-            'force_published_peak_n': finite(self._published.values[leg]),
+            keys.position_min: finite(peaks[lowest].values[leg]),
+            keys.position_max: finite(peaks[highest].values[leg]),
+            **peaks[kind.rate_limit].named(
+                leg, f'{kind.rate.name}_peak', unit_key(kind.rate.unit)),
+            **peaks[kind.effort_limit].named(
+                leg, f'{kind.effort.name}_peak', unit_key(kind.effort.unit)),
+            keys.effort_rms: finite(math.sqrt(squares)),
+            keys.effort_published: finite(self._published.values[leg]),
             **self._power.named(leg, 'power_peak', 'w'),
             'power_mean_w': finite(driving - braking),
             'energy_driving_j': finite(energy_driving) if solved else None,
@@ -251,17 +292,20 @@ class Summary:
         for name, peak in peaks.items():
             limit, bound = LIMITS[name], self._limits.bounds.get(name)
             quantity = limit.quantity
-            if name not in USUAL:
-                kind = 'min' if limit.minimum else 'max' if limit.depends == POSE else 'peak'
-                found |= peak.named(leg, f'{quantity.key}_{kind}', unit_key(quantity.unit))
+            if name not in self._names.usual:
+                what = 'min' if limit.minimum else 'max' if limit.depends == POSE else 'peak'
+                found |= peak.named(leg, f'{quantity.key}_{what}', unit_key(quantity.unit))
             key, margin = margin_key(quantity), None
             if bound is not None:
                 margin = finite(
                     0.0 - Exceedance(name, leg, peak.values[leg], bound[leg]).excess)
-            # a length has two limits
+            # a position has two limits
             found[key] = min((each for each in (found.get(key), margin) if each is not None),
                              default=None)
-        return found | (dict.fromkeys(_OF_VELOCITY) if self._quasi_static else {})
+        of_velocity = (
+            keys.rate_peak, keys.rate_at, keys.rate_margin, 'power_peak_w', 'power_peak_at_s',
+            'power_mean_w', 'energy_driving_j', 'energy_braking_j')
+        return found | (dict.fromkeys(of_velocity) if self._quasi_static else {})
 
     def _singularity(self) -> dict[str, Any]:
         # the leg with the largest force under a unit load
@@ -289,9 +333,10 @@ class Summary:
         if not self._has_breakdown:
             return None
         rms = np.sqrt(self._source_squares.mean).reshape(-1, 6)
-        unknown: dict[str, float | None] = {'peak_n': None, 'rms_n': None}
+        peak_key, rms_key = (key_of(name, self._kind.effort.unit) for name in ('peak', 'rms'))
+        unknown: dict[str, float | None] = {peak_key: None, rms_key: None}
         return {name: {source: unknown if self._quasi_static and source not in _AT_REST else {
-            'peak_n': finite(self._source_peaks[n].values[leg]), 'rms_n': finite(rms[n, leg])}
+            peak_key: finite(self._source_peaks[n].values[leg]), rms_key: finite(rms[n, leg])}
             for n, source in enumerate(self._sources)}
             for leg, name in enumerate(self._legs)}
 

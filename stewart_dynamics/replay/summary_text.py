@@ -11,10 +11,12 @@ import re
 import textwrap
 from typing import Any
 
+from stewart_dynamics.legs.kind import LegKind, Named
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.statements import (
     INPUTS, JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING, SINGULARITY)
+from stewart_dynamics.replay.summary import key_of, kind_in, LegKeys
 from stewart_dynamics.reporting.pages import fixed
 from stewart_dynamics.response.axes_response import AXES
 from stewart_dynamics.response.response_measures import bandwidth, BANDWIDTHS
@@ -28,7 +30,7 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
     """Return the summary of a bag, from summary.json; likely mistakes are no part of it."""
     lines = [f'{summary["bag"]}:']
     if summary['measured']:
-        lines += _measured_lines(summary['measured'])
+        lines += _measured_lines(summary['measured'], kind_in(summary['legs']).effort)
     if summary['response']:
         lines += _response_lines(summary['response'])
     lines += summary_lines(summary)
@@ -47,14 +49,17 @@ def summary_lines(summary: Mapping[str, Any]) -> list[str]:
         return ['no setpoint could be answered']
     about = motion_statements(summary)
     heading, *reading = [each.line for each in about if each.topic == READING]
-    legs = summary['legs'].values()
-    clipped = [leg['force_margin_n'] is not None and leg['force_margin_n'] <= 0.0 for leg in legs]
-    lines = [heading, '', *_legs_table(summary['legs'], clipped)]
+    kind = kind_in(summary['legs'])
+    margins = [leg[LegKeys.of(kind).effort_margin] for leg in summary['legs'].values()]
+    clipped = [margin is not None and margin <= 0.0 for margin in margins]
+    effort = kind.effort
+    lines = [heading, '', *_legs_table(summary['legs'], clipped, kind)]
     if summary['quasi_static']:
-        lines.append('velocities are not known: the forces are those at rest; rates, power and '
-                     'energy are not known')
+        lines.append(f'velocities are not known: the {effort.field} are those at rest; '
+                     f'{kind.rate.field}, power and energy are not known')
     if any(clipped):
-        lines.append('* reaches limits.force_max: the published force is clipped to it')
+        lines.append(f'* reaches {kind.effort_limit}: the published {effort.name} is clipped to '
+                     'it')
     lines += [each.line for each in about if each.topic in (
         INPUTS, LIMITS, MOTOR_LIMITS, JOINTS, LOADS, MOTORS)]
     lines += [*reading, '', *(each.line for each in about if each.topic == SINGULARITY)]
@@ -68,30 +73,33 @@ def _filled(line: str) -> str:
                          break_on_hyphens=False).replace('\0', ' ')
 
 
-def measured_headline(measured: Mapping[str, Any]) -> str:
-    """Return by how much measured and computed forces differ, from the values of Comparison."""
+def measured_headline(measured: Mapping[str, Any], kind: LegKind) -> str:
+    """Return by how much measured and computed efforts differ, from the values of Comparison."""
     if not measured['setpoints_compared']:
         return 'no setpoint could be compared'
     mistake = measured['likely_mistake']
     likely = '' if mistake is None else f'likely mistake: {mistake["text"]}; ' + (
         '' if measured['external_wrench_given'] else 'no external wrench is given; ')
-    worst, leg = max((leg['residual_rms_n'], name) for name, leg in measured['legs'].items())
+    effort, rms = kind.effort, key_of('residual_rms', kind.effort.unit)
+    worst, leg = max((leg[rms], name) for name, leg in measured['legs'].items())
     share = '' if measured['residual_share'] is None else (
-        f', {100.0 * measured["residual_share"]:.3g} % of the measured force')
-    return (f'{likely}measured and computed forces differ by {measured["residual_rms_n"]:.3g} N '
-            f'RMS{share}; most in {leg}, by {worst:.3g} N')
+        f', {100.0 * measured["residual_share"]:.3g} % of the measured {effort.name}')
+    return (f'{likely}measured and computed {effort.field} differ by {measured[rms]:.3g} '
+            f'{effort.unit} RMS{share}; most in {leg}, by {worst:.3g} {effort.unit}')
 
 
-def _measured_lines(measured: Mapping[str, Any]) -> list[str]:
-    """Return the result of the comparison with measured forces, the headline first."""
+def _measured_lines(measured: Mapping[str, Any], effort: Named) -> list[str]:
+    """Return the result of the comparison with measured efforts, the headline first."""
     lines = [measured['headline']]
     if not measured['setpoints_compared']:
         return lines
-    rms = ', '.join(f'{leg} {fixed(found["residual_rms_n"], 1)}' for leg, found in
-                    measured['legs'].items())
+    key = key_of('residual_rms', effort.unit)
+    rms = ', '.join(
+        f'{leg} {fixed(found[key], 1)}' for leg, found in measured['legs'].items())
     lines += [f'compared {measured["setpoints_compared"]} setpoints; measured minus computed '
-              f'force, RMS [N]: {rms}',
-              'stewart_identify finds the payload and friction that fit the measured forces']
+              f'{effort.name}, RMS [{effort.unit}]: {rms}',
+              'stewart_identify finds the payload and friction that fit the measured '
+              f'{effort.field}']
     contacts = measured['contacts']
     lines += [f'contact {_span(each["from_s"], each["to_s"])}: external force '
               f'({", ".join(fixed(part, 1) for part in each["force_n"])}) N'
@@ -120,36 +128,45 @@ def _span(begin: float, end: float) -> str:
     return f'at t = {first} s' if first == last else f'from t = {first} to {last} s'
 
 
-# Columns of the table of legs: group, title, key, width, decimals. With the leg's name and the
-# mark, they have the width _WIDTH.
-_COLUMNS = (
-    ('force [N]', 'peak', 'force_peak_n', 10, 1), ('force [N]', 'at [s]', 'force_peak_at_s', 9, 2),
-    ('force [N]', 'RMS', 'force_rms_n', 9, 1), ('force [N]', 'margin', 'force_margin_n', 9, 1),
-    ('power [W]', 'peak', 'power_peak_w', 10, 1),
-    ('length [m]', 'from', 'length_min_m', 8, 4), ('length [m]', 'to', 'length_max_m', 8, 4),
-    ('length [m]', 'margin', 'length_margin_m', 8, 4),
-    ('rate [m/s]', 'peak', 'rate_peak_m_s', 9, 4),
-    ('rate [m/s]', 'margin', 'rate_margin_m_s', 8, 4))
 _NAME = 11
-_MARKED = 'force_peak_n'
+
+
+def _columns(kind: LegKind) -> list[tuple[str, str, str, int, int]]:
+    """
+    Return the columns of the table of legs: group, title, key, width, decimals.
+
+    With the leg's name and the mark, they have the width _WIDTH.
+    """
+    keys = LegKeys.of(kind)
+    effort, position, rate = (f'{each.name} [{each.unit}]' for each in (
+        kind.effort, kind.position, kind.rate))
+    return [
+        (effort, 'peak', keys.effort_peak, 10, 1), (effort, 'at [s]', keys.effort_at, 9, 2),
+        (effort, 'RMS', keys.effort_rms, 9, 1), (effort, 'margin', keys.effort_margin, 9, 1),
+        ('power [W]', 'peak', 'power_peak_w', 10, 1),
+        (position, 'from', keys.position_min, 8, 4), (position, 'to', keys.position_max, 8, 4),
+        (position, 'margin', keys.position_margin, 8, 4),
+        (rate, 'peak', keys.rate_peak, 9, 4), (rate, 'margin', keys.rate_margin, 8, 4)]
 
 
 def _legs_table(legs: Mapping[str, Mapping[str, float | None]],
-                marked: Sequence[bool]) -> list[str]:
+                marked: Sequence[bool], kind: LegKind) -> list[str]:
     """Return the table of the legs; columns without numbers are left out."""
-    columns = [column for column in _COLUMNS
+    marked_key = LegKeys.of(kind).effort_peak
+    columns = [column for column in _columns(kind)
                if any(leg[column[2]] is not None for leg in legs.values())]
     spans: dict[str, int] = {}
     titles = f'{"leg":<{_NAME}}'
     for group, title, key, width, _ in columns:
-        spans[group] = spans.get(group, 0) + width + (key == _MARKED)
-        titles += f'{title:>{width}}' + ' ' * (key == _MARKED)
+        spans[group] = spans.get(group, 0) + width + (key == marked_key)
+        titles += f'{title:>{width}}' + ' ' * (key == marked_key)
     lines = [' ' * _NAME + ''.join(f' {group:-^{span - 1}}' for group, span in spans.items()),
              titles]
     for (name, leg), mark in zip(legs.items(), marked, strict=True):
         line = f'{name:<{_NAME}.{_NAME}}'
         for _, _, key, width, digits in columns:
-            line += _fitted(leg[key], width, digits) + ('* '[not mark] if key == _MARKED else '')
+            marks = '* '[not mark] if key == marked_key else ''
+            line += _fitted(leg[key], width, digits) + marks
         lines.append(line)
     return lines
 

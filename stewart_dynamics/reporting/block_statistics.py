@@ -70,11 +70,11 @@ class Exceeded:
     """
     Number of samples that exceed a limit, the first and the worst of them, of each leg.
 
-    Values below a minimum exceed it; larger magnitudes exceed another limit.
+    measure: of values, see ``Limit.measure``; by default their magnitudes.
     """
 
-    def __init__(self, minimum: bool = False) -> None:
-        self._minimum = minimum
+    def __init__(self, measure: Callable[[Array], Array] = np.abs) -> None:
+        self._measure = measure
         self._samples = np.zeros(6, dtype=np.int64)
         self._excess: Array = np.full(6, -np.inf)
         self._first_at, self._worst, self._bounds = (np.full(6, np.nan) for _ in range(3))
@@ -86,8 +86,7 @@ class Exceeded:
         new = exceeding.any(axis=0) & (self._samples == 0)
         self._first_at[new] = seconds[exceeding.argmax(axis=0)][new]
         self._samples += exceeding.sum(axis=0)
-        excess = np.where(
-            exceeding, bounds - values if self._minimum else np.abs(values) - bounds, -np.inf)
+        excess = np.where(exceeding, self._measure(values) - self._measure(bounds), -np.inf)
         worst = excess.argmax(axis=0), np.arange(6)
         more = excess[worst] > self._excess
         for kept, found in ((self._excess, excess), (self._worst, values),

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.colors import AXIS_COLORS, LEG_COLORS, ROLES
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES, sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, LIMITS, LOAD, OF_JOINTS,
-    OF_LOADS, OF_RATES, OF_RESULTS, POSE, short_name, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX)
+    ANGLES, BASE_ANGLE_MAX, CLEARANCE_MIN, LEVER_MIN, LIMITS, limits_of, LOAD, OF_JOINTS, POSE,
+    short_name, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.spectrum import Density
 
@@ -79,6 +79,8 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
     first: position of the first setpoint [m]; the curves of positions begin there.
     """
     joints, begin = p.joints, ', '.join(f'{each:.6g}' for each in first)
+    kind, limits = p.leg_kind, limits_of(p)
+    effort = kind.effort
     of_motion = [
         Plot('velocity', 'Velocity of the platform', 'm/s',
              _of_axes(at['velocity'], 'v x', 'v y', 'v z'), 'of its origin, base axes'),
@@ -90,9 +92,9 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
         Plot('angular_acceleration', 'Angular acceleration of the platform', 'deg/s²',
              _of_axes(at['angular_acceleration'], 'dw/dt x', 'dw/dt y', 'dw/dt z'), 'base axes')]
     of_rates = [
-        *_of_results(p, at, OF_RATES),
+        *_of_results(p, at, limits.rates),
         Plot('powers', 'Mechanical power of the legs', 'W', _of_legs(joints, at['powers']),
-             'demanded force times rate; + drives, − brakes', spikes=True)]
+             f'demanded {effort.name} times {kind.rate.name}; + drives, − brakes', spikes=True)]
     return [
         # one scale for all axes: the height above the base is far larger than the motion
         Plot('position', 'Inputs: position of the platform, from the first setpoint', 'm',
@@ -101,7 +103,8 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
         Plot('angles', 'Inputs: orientation of the platform', 'deg',
              _of_axes(at['angles'], 'alpha', 'beta', 'gamma'), 'R = Rz(gamma) Ry(beta) Rx(alpha)'),
         *(of_motion if velocities_known else ()),
-        *_of_results(p, at, (LENGTH_MIN, LENGTH_MAX)),
+        *_of_results(p, at, kind.position_limits),
+        *_of_results(p, at, [name for name in plotted(p) if name == LEVER_MIN]),
         *(_of_joints(p, limit, at['joint_angles'].start) for limit in OF_JOINTS
           if p[limit] is not None),
         *([] if p.limits.leg_clearance_min is None else [
@@ -116,23 +119,24 @@ def motion_plots(p: Parameters, at: Places, velocities_known: bool, first: Seque
              'dimensionless; 1 is best', [
                  Bound(p.singularity.warn_condition, 'warn', ROLES['near']),
                  Bound(p.singularity.stop_condition, 'stop', ROLES['singular'])], log=True),
-        *_of_results(p, at, OF_LOADS),
+        *_of_results(p, at, limits.loads),
         *(of_rates if velocities_known else ()),
         *(_of_motors(p, at, velocities_known) if p.drives else ()),
-        Plot('force_breakdown', 'Leg force by source', 'N', {
-            leg: [Curve('sum', ROLES['zero'], at['force'].start + n, width=4.5),
+        Plot('force_breakdown', f'Leg {effort.name} by source', effort.unit, {
+            leg: [Curve('sum', ROLES['zero'], at[effort.name].start + n, width=4.5),
                   *(Curve(source, _SOURCE_COLORS[source], at['breakdown'].start + 6 * k + n)
                     for k, source in enumerate(sources_of(p)))]
-            for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
+            for n, leg in enumerate(joints)}, f'the parts of the demanded {effort.name}',
+            spikes=True)]
 
 
 def plotted(p: Parameters) -> list[str]:
-    """Return the limits in OF_RESULTS whose quantities are plotted."""
-    return [name for name in OF_RESULTS if LIMITS[name].usual or p[name] is not None]
+    """Return the limits whose quantities are always known, and are plotted."""
+    return [name for name in limits_of(p).known if LIMITS[name].usual or p[name] is not None]
 
 
 def _of_results(p: Parameters, at: Places, names: Sequence[str]) -> Iterator[Plot]:
-    """Yield the plots of quantities in a row of results, each with its limits."""
+    """Yield the plots of quantities that are always known, each with its limits."""
     shown = [LIMITS[name] for name in names if name in plotted(p)]
     for quantity in dict.fromkeys(limit.quantity for limit in shown):
         limits = [limit for limit in shown if limit.quantity == quantity]
@@ -188,16 +192,18 @@ def spectrum_plots(density: Density, first: int) -> list[Plot]:
 
 
 def measured_plots(p: Parameters, at: Places) -> list[Plot]:
-    """Return the plots of a comparison with measured forces."""
+    """Return the plots of a comparison with measured efforts."""
+    effort = p.leg_kind.effort
     return [
-        Plot('measured', 'Measured and computed leg force', 'N', {
+        Plot('measured', f'Measured and computed leg {effort.name}', effort.unit, {
             leg: [Curve('measured', _BLACK, at['measured'].start + n),
                   Curve('computed', LEG_COLORS[n], at['computed'].start + n),
                   Curve('residual', ROLES['faint'], at['residual'].start + n, 'dot')]
             for n, leg in enumerate(p.joints)}, 'residual: measured less computed',
             contacts=True, spikes=True),
-        Plot('residuals', 'Residual of every leg', 'N', _of_legs(p.joints, at['residual']),
-             'measured less computed force', contacts=True, spikes=True),
+        Plot('residuals', 'Residual of every leg', effort.unit,
+             _of_legs(p.joints, at['residual']), f'measured less computed {effort.name}',
+             contacts=True, spikes=True),
         Plot('external_force', 'External force', 'N',
              _of_axes(at['external_force'], 'F x', 'F y', 'F z'),
              'J_inv^T (computed − measured): the load that the model does not include, base axes',

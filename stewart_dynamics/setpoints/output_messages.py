@@ -6,11 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Flags, Stamps
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics import rows
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import JointStateWriter
@@ -21,20 +23,41 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.step import (
     CHANGED, FINITE_MOTORS, MOTOR_ANGLES, MOTOR_COMMANDS, MOTOR_SPEEDS, OUTPUT, Outputs, POSITIONS,
-    PUBLISHED_FORCES, WARNING_STATE)
+    WARNING_STATE)
 
-LEG_STATES, LEG_LENGTHS, LEG_FORCES = 'leg_states', 'leg_lengths', 'leg_forces'
-DETERMINANT, WARNING = 'jacobian_determinant', 'singularity_warning'
+LEG_STATES, DETERMINANT, WARNING = (
+    'leg_states', 'jacobian_determinant', 'singularity_warning')
 MOTOR_STATES, MOTOR_TORQUES = 'motor_states', 'motor_torques'
-# Topics relative to the node's name, in the order in which they are published for a setpoint.
-OUTPUT_TYPES = {
-    LEG_STATES: type_names.JOINT_STATE,
-    LEG_LENGTHS: type_names.FLOAT64_MULTI_ARRAY,
-    LEG_FORCES: type_names.FLOAT64_MULTI_ARRAY,
-    DETERMINANT: type_names.FLOAT64,
-    WARNING: type_names.BOOL,
-    BASE_WRENCH: type_names.WRENCH_STAMPED,
-}
+
+
+class LegTopics(NamedTuple):
+    """Topics that are named by the quantities of a kind of legs."""
+
+    positions: str  # leg_lengths
+    efforts: str  # those to command: leg_forces
+
+    @classmethod
+    def of(cls, kind: LegKind) -> LegTopics:
+        """Return the topics of a kind."""
+        return cls(f'leg_{kind.position.field}', f'leg_{kind.effort.field}')
+
+
+def output_types(kind: LegKind) -> dict[str, str]:
+    """
+    Return the topics that hexapods with a kind of legs have, and their types.
+
+    Topics are relative to the node's name, in the order in which they are published for a
+    setpoint.
+    """
+    return {
+        LEG_STATES: type_names.JOINT_STATE,
+        **dict.fromkeys(LegTopics.of(kind), type_names.FLOAT64_MULTI_ARRAY),
+        DETERMINANT: type_names.FLOAT64,
+        WARNING: type_names.BOOL,
+        BASE_WRENCH: type_names.WRENCH_STAMPED,
+    }
+
+
 # With drive.*.
 MOTOR_TYPES = {
     MOTOR_STATES: type_names.JOINT_STATE,
@@ -50,16 +73,17 @@ class OutputMessages:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        states = JointStateWriter(parameters.joints)
-        force, moving = PUBLISHED_FORCES.start, [POSITIONS, rows.RATES]
+        kind = parameters.leg_kind
+        states, topics = JointStateWriter(parameters.joints), LegTopics.of(kind)
+        effort, moving = kind.published.start, [POSITIONS, kind.rate.columns]
         kinds = [
-            Written(LEG_STATES, states.layout(True), [*moving, PUBLISHED_FORCES], known=force),
-            Written(LEG_STATES, states.layout(False), moving, unknown=force),
-            Written(LEG_LENGTHS, FLOAT64_ARRAY, [rows.LENGTHS]),
-            Written(LEG_FORCES, FLOAT64_ARRAY, [PUBLISHED_FORCES], known=force),
+            Written(LEG_STATES, states.layout(True), [*moving, kind.published], known=effort),
+            Written(LEG_STATES, states.layout(False), moving, unknown=effort),
+            Written(topics.positions, FLOAT64_ARRAY, [kind.position.columns]),
+            Written(topics.efforts, FLOAT64_ARRAY, [kind.published], known=effort),
             Written(DETERMINANT, FLOAT64, [slice(rows.DETERMINANT, rows.CONDITION)]),
             Written(WARNING, BOOLEAN, [WARNING_STATE], positive=CHANGED)]
-        self.types = OUTPUT_TYPES
+        self.types = output_types(kind)
         if (motors := motor_states_writer(parameters)) is not None:
             torque, turning = MOTOR_COMMANDS.start, [MOTOR_ANGLES, MOTOR_SPEEDS]
             kinds += [
@@ -69,7 +93,7 @@ class OutputMessages:
                         positive=FINITE_MOTORS),
                 Written(MOTOR_TORQUES, FLOAT64_ARRAY, [MOTOR_COMMANDS], known=torque,
                         positive=FINITE_MOTORS)]
-            self.types = OUTPUT_TYPES | MOTOR_TYPES
+            self.types |= MOTOR_TYPES
         self._of_outputs = SideBySide(kinds, OUTPUT)
         self._wrench = StampedWriter(parameters.base_frame, 6)
 

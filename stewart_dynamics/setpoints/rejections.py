@@ -14,8 +14,8 @@ from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.messages.cdr import MALFORMED, NOT_FINITE
 
 __all__ = ['BASE_NOT_KNOWN', 'DROPPED', 'frame_details', 'MALFORMED', 'NOT_EXCLUSIVE',
-           'NOT_FINITE', 'NOT_JOINED', 'NOT_MEASURED', 'NOT_UNIT', 'OUT_OF_RANGE', 'Rejection',
-           'Rejections', 'STAMP_ZERO', 'TOO_OLD', 'TWICE', 'WRONG_FRAME']
+           'NOT_FINITE', 'NOT_JOINED', 'NOT_MEASURED', 'NOT_UNIT', 'OUT_OF_RANGE', 'OUT_OF_REACH',
+           'Rejection', 'Rejections', 'STAMP_ZERO', 'TOO_OLD', 'TWICE', 'WRONG_FRAME']
 
 BASE_NOT_KNOWN = "the base's motion is not known"
 NOT_UNIT = 'quaternion not of unit length'
@@ -24,6 +24,7 @@ WRONG_FRAME = 'wrong frame_id'
 TOO_OLD = 'older than the last used'
 TWICE = 'same stamp twice'
 OUT_OF_RANGE = 'out of range: numbers overflow'
+OUT_OF_REACH = 'out of reach'
 NOT_EXCLUSIVE = 'more than one writer'
 # Prefix of reasons for which valid messages are not used.
 _DROPPED = 'dropped: '

@@ -24,8 +24,8 @@ from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, Exceedance, JUMP, limit_bounds, LIMITS, limits_of, NO_COLUMNS,
     OF_MOTORS, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, JOINT_FORCES, LENGTHS, MOTION,
-    NO_BASE, RATES, RESULT, UNIT_LOAD_FORCES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, JOINT_FORCES, MOTION, NO_BASE, RESULT,
+    UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import (
     CAUSE, Singularity, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.parameters.table import Parameters
@@ -35,9 +35,9 @@ _SETPOINT, _OUTPUT = places('setpoint'), places('stewart_output')
 _MOTION, _LOAD, _BASE, _BASE_KNOWN, _RESTART, _STAMPED = (_SETPOINT[name] for name in (
     'motion', 'wrench', 'base', 'base_known', 'restart', 'stamped'))
 SETPOINT = 1 + _STAMPED
-(POSITIONS, PUBLISHED_FORCES, _MEAN_RATES, _BASE_JOINT_ANGLES, _PLATFORM_JOINT_ANGLES,
- _CLEARANCES, MOTORS, RISES) = (_OUTPUT[name] for name in (
-     'positions', 'forces', 'mean_rates', 'base_joint_angles', 'platform_joint_angles',
+(POSITIONS, LEVER_TIMES, _MEAN_RATES, _BASE_JOINT_ANGLES, _PLATFORM_JOINT_ANGLES, _CLEARANCES,
+ MOTORS, RISES) = (_OUTPUT[name] for name in (
+     'positions', 'lever_times', 'mean_rates', 'base_joint_angles', 'platform_joint_angles',
      'clearances', 'motors', 'rises'))
 MOTOR_ANGLES, MOTOR_SPEEDS, MOTOR_COMMANDS = (
     _OUTPUT[f'motors.{name}'] for name in ('angles', 'speeds', 'commands'))
@@ -147,12 +147,24 @@ class Batch(NamedTuple):
 
 
 class Computed(NamedTuple):
-    """Which parts of an output are computed; the others are nan."""
+    """Where an output has numbers of the drives, and which others are computed, not nan."""
 
+    positions: slice
+    rates: slice
+    efforts: slice  # demanded
+    commands: slice
     joint_angles: bool
     clearances: bool
     motors: bool
-    limits: tuple[str, ...]  # whose quantities are in rows of results
+    limits: tuple[str, ...]  # whose quantities are always known
+
+    @classmethod
+    def of(cls, parameters: Parameters, joint_angles: bool = False, clearances: bool = False,
+           motors: bool = False) -> Computed:
+        """Return it for the kind of legs of a hexapod."""
+        kind = parameters.leg_kind
+        return cls(kind.position.columns, kind.rate.columns, kind.effort.columns, kind.published,
+                   joint_angles, clearances, motors, limits_of(parameters).known)
 
 
 class Outputs(NamedTuple):
@@ -174,19 +186,23 @@ class Outputs(NamedTuple):
         return self.rows[:, :RESULT]
 
     @property
-    def lengths(self) -> Array:
-        """(N, 6) [m]."""
-        return self.rows[:, LENGTHS]
+    def drive_positions(self) -> Array:
+        """(N, 6): lengths of telescopic legs [m], ...: of ``LegKind.position``."""
+        return self.rows[:, self.computed.positions]
 
     @property
     def rates(self) -> Array:
-        """(N, 6) [m/s]."""
-        return self.rows[:, RATES]
+        """(N, 6): of ``LegKind.rate``."""
+        return self.rows[:, self.computed.rates]
 
     @property
-    def demanded_forces(self) -> Array:
-        """Unclipped forces (N, 6) [N]; nan where J_inv cannot be solved or the base is unknown."""
-        return self.rows[:, FORCES]
+    def demanded_efforts(self) -> Array:
+        """
+        Unclipped efforts of the drives (N, 6), of ``LegKind.effort``.
+
+        They are nan where J_inv cannot be solved or the base is unknown.
+        """
+        return self.rows[:, self.computed.efforts]
 
     @property
     def joint_forces(self) -> Array:
@@ -219,14 +235,19 @@ class Outputs(NamedTuple):
         return self.conditions < UNSOLVABLE_CONDITION
 
     @property
-    def forces(self) -> Array:
-        """As published (N, 6): clipped to limits.force_max; nan where suppressed or unknown."""
-        return self.rows[:, PUBLISHED_FORCES]
+    def efforts(self) -> Array:
+        """As published (N, 6): clipped to their limit; nan where suppressed or unknown."""
+        return self.rows[:, self.computed.commands]
 
     @property
-    def with_forces(self) -> Flags:
-        """(N,): forces are published."""
-        return ~np.isnan(self.rows[:, PUBLISHED_FORCES.start])
+    def with_efforts(self) -> Flags:
+        """(N,): efforts are published."""
+        return ~np.isnan(self.rows[:, self.computed.commands.start])
+
+    @property
+    def lever_times(self) -> Array:
+        """Until the lever of each drive falls to its limit (N, 6) [s]; inf: never."""
+        return self.rows[:, LEVER_TIMES]
 
     @property
     def joint_angles(self) -> Array:
@@ -314,9 +335,9 @@ class Step:
         self.parameters = parameters
         hexapod = limited_structure(parameters)
         self._hexapod, self._bounds = hexapod, limit_bounds(parameters)
-        self._computed = Computed(
-            bool(hexapod['with_joint_angles']), bool(hexapod['with_clearance']),
-            bool(hexapod['with_motors']), limits_of(parameters).results)
+        self._computed = Computed.of(
+            parameters, *(bool(hexapod[f'with_{each}']) for each in (
+                'joint_angles', 'clearance', 'motors')))
         self._step = function('step_setpoints').bound(hexapod)
         # A single setpoint is copied to memory that stays: half the time of a call with any.
         self._memory: tuple[Any, ...] = (

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measured efforts as leg forces, and likely mistakes in their sign and unit."""
+"""Measured efforts as those of the drives, and likely mistakes in their sign and unit."""
 
 from __future__ import annotations
 
@@ -14,14 +14,12 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
-from stewart_dynamics.parameters.table import AUTO, Parameters, STANDARD_GRAVITY
+from stewart_dynamics.parameters.table import AUTO, Parameters
 
 # A scale of the efforts within this ratio of a known factor is attributed to that factor.
 _NEAR = 1.35
 # A scale that differs from 1 by a larger ratio is a mistake; a smaller one is that of torques.
 FAR, _TORQUES = 2.0, 0.05
-_FACTORS = ((1e-3, 'kN in place of N'), (-1.0 / STANDARD_GRAVITY[2], 'kgf in place of N'),
-            (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
 ZERO, SIGN, UNIT, TORQUE, FORCE, SCALE, SWAPPED = (
     'zero', 'sign', 'unit', 'torque', 'force', 'scale', 'swapped')
 RATE, STAMPS = 'rate', 'stamps'  # not of the efforts
@@ -39,19 +37,18 @@ _SUSPICIOUS, _BETTER = 0.03 ** 2, 0.25
 
 def force_per_effort(parameters: Parameters, torques: bool, currents: bool) -> Array | None:
     """
-    Return the leg force for an effort of 1 (6,), with the losses; None where efforts are forces.
+    Return the drive's effort for one of 1 (6,), with the losses; None where they are the same.
 
     torques, currents: whether efforts are motor torques [N m], or motor currents [A].
 
     Raises ParameterError if a parameter of the drives that this needs has no value, or if screws
     are self-locking: the torque of a motor then does not show the load that drives it back.
     """
-    lead, constant = parameters.actuator.screw_lead, parameters.drive.torque_constant
-    for option, given, name, value in (
-            ('--motor-torque', torques, 'actuator.screw_lead', lead),
-            ('--motor-current', currents, 'actuator.screw_lead', lead),
-            ('--motor-current', currents, 'drive.torque_constant', constant)):
-        if given and value is None:
+    ratio, constant = parameters.leg_kind.ratio, parameters.drive.torque_constant
+    for option, given, name in (
+            ('--motor-torque', torques, ratio), ('--motor-current', currents, ratio),
+            ('--motor-current', currents, 'drive.torque_constant')):
+        if given and name and parameters[name] is None:
             raise ParameterError(f'{name}: has no value: {option} needs it')
     if not (torques or currents):
         return None
@@ -59,7 +56,8 @@ def force_per_effort(parameters: Parameters, torques: bool, currents: bool) -> A
     if np.any(back <= 0.0):
         raise ParameterError(
             f'drive.back_driving_efficiency: {back.min():g}: must be more than 0 where efforts '
-            'are those of motors: the torque at a self-locking screw does not show its load')
+            f'are those of motors: the torque at a self-locking {parameters.leg_kind.gear} does '
+            'not show its load')
     per_torque = motor_ratio(parameters)
     return per_torque * constant if currents and constant is not None else per_torque
 
@@ -170,8 +168,9 @@ class EffortSums:
         if _is_near(product / self.computed_squares[leg], -1.0) and (
                 product ** 2 > _ALIKE ** 2 * self.measured_squares[leg]
                 * self.computed_squares[leg]):
-            return LegMistake(SIGN, f'the effort of {joints[leg]} has the opposite sign of '
-                                    'those of the other legs: + must push')
+            return LegMistake(SIGN, (
+                f'the effort of {joints[leg]} has the opposite sign of those of the other legs: '
+                f'{self._parameters.leg_kind.right_sign}'))
         return None
 
     def _swapped(self) -> LegMistake | None:
@@ -202,6 +201,7 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> LegMistake
 
     of_motors: whether the efforts were torques or currents of the motors.
     """
+    kind = p.leg_kind
     if not np.isfinite(scale) or scale == 0.0:
         return LegMistake(
             ZERO, 'all efforts are zero: brakes hold the legs, or no efforts are measured')
@@ -209,26 +209,30 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> LegMistake
         other = '' if p.geometry.platform_side != AUTO else (
             '; or the platform is on the other side of the base: geometry.platform_side')
         return LegMistake(SIGN, (
-            'the efforts have the opposite sign: + must push, as the forces of the node do (they '
-            f'are {scale:.3g} times what the model computes){other}'))
+            f'the efforts have the opposite sign: {kind.right_sign}, as the {kind.effort.field} '
+            f'of the node do (they are {scale:.3g} times what the model computes){other}'))
     if 1.0 / FAR < scale < FAR:
         return None
     lead, ratio = p.actuator.screw_lead, p.drive.gear_ratio
-    torques = ('likely torques of the motors in place of forces: stewart_replay and '
+    torques = (f'likely torques of the motors in place of {kind.effort.field}: stewart_replay and '
                'stewart_identify take them with --motor-torque')
-    units = [unit for factor, unit in _FACTORS if _is_near(scale, factor)]
+    units = [unit for factor, unit in kind.wrong_units if _is_near(scale, factor)]
+    known = bool(np.isfinite(motor_ratio(p)).all())
     if of_motors and any(_is_near(scale, each, _LOSSES) for each in _per_effort(p)):
-        what, likely = FORCE, ('likely forces at the legs in place of torques or currents of the '
-                               'motors: omit --motor-torque, --motor-current')
-    elif of_motors and lead is not None:
+        what, likely = FORCE, (f'likely {kind.effort.field} at the legs in place of torques or '
+                               'currents of the motors: omit --motor-torque, --motor-current')
+    elif of_motors and known:
+        of_lead = '' if lead is None else (
+            f'actuator.screw_lead, {lead[0]:g} m, is wrong: about {lead[0] * scale:.3g} m would '
+            'fit; or ')
         what, likely = SCALE, (
-            f'likely actuator.screw_lead, {lead[0]:g} m, is wrong: about {lead[0] * scale:.3g} m '
-            f'would fit; or drive.gear_ratio, {ratio[0]:g}: about {ratio[0] / scale:.3g}')
-    elif lead is not None and _is_near(scale, float(np.mean(1.0 / motor_ratio(p)))):
+            f'likely {of_lead}drive.gear_ratio, {ratio[0]:g}: about {ratio[0] / scale:.3g}'
+            + ' would fit' * (lead is None))
+    elif known and _is_near(scale, float(np.mean(1.0 / motor_ratio(p)))):
         what, likely = TORQUE, torques
     elif units:
         what, likely = UNIT, f'likely {units[0]}'
-    elif scale < _TORQUES:
+    elif scale < _TORQUES and kind.ratio:
         what, likely = TORQUE, (f'{torques}, with actuator.screw_lead (a lead of '
                                 f'{2.0 * np.pi * scale:.2g} m would fit)')
     else:
@@ -241,8 +245,9 @@ def known_scales(p: Parameters, of_motors: bool) -> list[float]:
     """Return the scales of efforts that ``mistake_of_scale`` attributes to a unit."""
     if of_motors:
         return _per_effort(p)
-    torques = [] if p.actuator.screw_lead is None else [float(np.mean(1.0 / motor_ratio(p)))]
-    return [factor for factor, _ in _FACTORS] + torques
+    torque = float(np.mean(1.0 / motor_ratio(p)))
+    return [*(factor for factor, _ in p.leg_kind.wrong_units), *(
+        [torque] if np.isfinite(torque) else [])]
 
 
 def _per_effort(p: Parameters) -> list[float]:

@@ -17,13 +17,14 @@ the same effect.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.rows import consecutive
 from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.table import Parameters
@@ -72,6 +73,27 @@ def _of_drives(p: Parameters) -> dict[str, str]:
     return {kind.fields['reflected_mass']: kind.inertia_unit,
             'actuator.viscous_friction': viscous, 'actuator.coulomb_friction': coulomb,
             'effort_offset': kind.effort.unit}
+
+
+class Places(NamedTuple):
+    """Where theta has the numbers of the legs and drives of a kind."""
+
+    masses: slice  # (6 n) those of ``LegKind.masses``
+    reflected_mass: slice
+    viscous_friction: slice
+    coulomb_friction: slice
+    offset: slice
+
+    @property
+    def whole(self) -> int:
+        """Return the number of parameters."""
+        end: int = self.offset.stop
+        return end
+
+    @classmethod
+    def of(cls, kind: LegKind) -> Places:
+        """Return the places of a kind."""
+        return cls(*consecutive(10, 6 * len(kind.masses), *4 * [6])[1:])
 
 
 def linear_parameters(p: Parameters) -> Array:

@@ -47,3 +47,10 @@ def poses(hexapod: Records, lengths: Array, motions: Array, codes: Integers, ste
 def twists(hexapod: Records, rates: Array, motions: Array) -> None:
     """Write into motions (N, MOTION) the twists of leg rates (N, 6) [m/s]."""
     function('twists_many')(hexapod, len(motions), rates, motions)
+
+
+def failure(steps: float, residual: float) -> str:
+    """Return why a search has the outcome NO_POSE, by its steps and residual [m]."""
+    if residual <= RESIDUAL:
+        return 'the pose is beyond a dead centre of a leg'
+    return f'did not converge: residual {residual:.3g} m after {steps:.0f} iterations'

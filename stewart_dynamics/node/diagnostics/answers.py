@@ -20,20 +20,19 @@ from statistics import median
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
-    Exceedance, JUMP, LENGTH_MAX, LENGTH_MIN, LIMITS, OF_LOADS, TORQUE_MAX, TORQUE_SPEED)
+    Exceedance, JUMP, LEVER_MIN, LIMITS, limits_of, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, UNIT_LOAD_FORCES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import (
     Cause, HYSTERESIS, Singularity, UNSOLVABLE_CONDITION)
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, OK, OK_LEVEL, PERIOD, REJECTED, Status, StatusPart, WARN)
 from stewart_dynamics.parameters.table import Parameters, SUPPRESS_FORCES
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
-from stewart_dynamics.setpoints.step import Batch, Outputs, PUBLISHED_FORCES, WARNING_STATE
+from stewart_dynamics.setpoints.step import Batch, LEVER_TIMES, Outputs, WARNING_STATE
 
 _CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singularity
-_DEMANDED = *OF_LOADS, TORQUE_MAX
-_OF_POSE = LENGTH_MIN, LENGTH_MAX, JUMP  # those that a wrong pose exceeds
+_DEAD_CENTRE = 'dead centre'  # a cause of the level of limits: it is predicted
 
 
 @dataclass
@@ -110,15 +109,16 @@ def singularity_state(row: Sequence[float], parameters: Parameters) -> Level:
     """Return the level of a row of outputs, and its cause with the numbers of the row."""
     condition = row[CONDITION]
     if condition >= UNSOLVABLE_CONDITION:
-        return Level(ERROR, 'J_inv cannot be solved: no forces')
+        return Level(ERROR, f'J_inv cannot be solved: no {parameters.leg_kind.effort.field}')
     cause, stopped, *_ = row[WARNING_STATE]
     if not cause and not stopped:
         return OK_LEVEL
     state = Singularity.of(row[WARNING_STATE])
     if state.stopped:
-        is_suppressed = not math.isnan(row[FORCES.start]) and (
+        efforts = parameters.leg_kind.effort
+        is_suppressed = not math.isnan(row[efforts.columns.start]) and (
             parameters.singularity.action == SUPPRESS_FORCES)
-        suppressed = ': forces suppressed' if is_suppressed else ''
+        suppressed = f': {efforts.field} suppressed' if is_suppressed else ''
         return Level(ERROR, f'inside stop_condition{suppressed}: ' + _condition(
             condition, 'stop_condition', parameters.singularity.stop_condition))
     if state.cause is Cause.CROSSED:
@@ -229,42 +229,65 @@ class SingularityDiagnostics(StatusPart):
 
 
 class LimitsDiagnostics(StatusPart):
-    """Notes which limits setpoints exceed, and the largest force demanded."""
+    """Notes which limits setpoints exceed, predicted ones, and the largest effort demanded."""
 
     name = 'limits'
 
     def __init__(self, answers: Answers) -> None:
-        super().__init__(*LIMITS)
+        super().__init__(*LIMITS, _DEAD_CENTRE)
         self._answers = answers
         self._joints = answers.parameters.joints
+        self._kind = kind = answers.parameters.leg_kind
+        limits = limits_of(answers.parameters)
+        self._demanded = *limits.loads, TORQUE_MAX
+        self._of_pose = *kind.position_limits, JUMP  # those that a wrong pose exceeds
+        self._with_levers = LEVER_MIN in limits.legs
+        self._predicted = False  # a dead centre
         self._setpoints = Counter[str]()  # that exceed each limit
         self._worst: dict[str, Exceedance] = {}
         self._suppressed = 0
         self._exceeding = False
         self._mistake = ''  # in the pose with which legs became too long or too short
-        self._largest_force, self._its_leg = 0.0, 0
+        self._largest_effort, self._its_leg = 0.0, 0
 
     def answered(self, setpoint: Batch, exceedances: Sequence[Exceedance], now: float) -> None:
         """Note the last outputs, the limits they exceed, and their setpoint."""
-        forces = self._answers.row[FORCES]
-        largest = abs(self._largest_force)
+        efforts = self._answers.row[self._kind.effort.columns]
+        largest = abs(self._largest_effort)
         # These two take less time than abs of each; nan is never larger.
-        if max(forces) > largest or min(forces) < -largest:
-            self._its_leg = max(range(6), key=lambda leg: abs(forces[leg]))
-            self._largest_force = forces[self._its_leg]
+        if max(efforts) > largest or min(efforts) < -largest:
+            self._its_leg = max(range(6), key=lambda leg: abs(efforts[leg]))
+            self._largest_effort = efforts[self._its_leg]
+        if self._with_levers:
+            self._predict(now)
         if exceedances or self._exceeding:
             self._exceeding = bool(exceedances)
             self._note_exceedances(setpoint, exceedances, now)
 
+    def _predict(self, now: float) -> None:
+        """Note whether a leg comes to its dead centre soon."""
+        times, bound = self._answers.row[LEVER_TIMES], (
+            self._answers.parameters.singularity.warn_time)
+        time, leg = _first_dead_centre(times)
+        if time < bound:
+            words = (f'dead centre predicted: {LIMITS[LEVER_MIN].quantity.name} of '
+                     f'{self._joints[leg]} falls to {LEVER_MIN} in {time:.3g} s, '
+                     f'singularity.warn_time is {bound:g} s')
+            self.held.see(Level(WARN, words), now, _DEAD_CENTRE)
+        elif self._predicted:
+            self.held.see(OK_LEVEL, now, _DEAD_CENTRE)
+        self._predicted = time < bound
+
     def _note_exceedances(
             self, setpoint: Batch, exceedances: Sequence[Exceedance], now: float) -> None:
         row = self._answers.row
-        published, demanded = row[PUBLISHED_FORCES.start], row[FORCES.start]
+        published, demanded = (
+            row[each.start] for each in (self._kind.published, self._kind.effort.columns))
         suppressed = math.isnan(published) and not math.isnan(demanded) and (
             self._answers.parameters.limits.action == SUPPRESS_FORCES) and any(
                 not LIMITS[each.limit].clips for each in exceedances)
         self._suppressed += suppressed
-        if not any(self.held.of(name, now).level for name in _OF_POSE):
+        if not any(self.held.of(name, now).level for name in self._of_pose):
             # At most once in a second: it may take a millisecond.
             self._mistake = pose_mistake(
                 self._answers.parameters, setpoint.motions[0].tolist(),
@@ -277,8 +300,8 @@ class LimitsDiagnostics(StatusPart):
             worst = max(exceeded, key=_excess)
             words = self._words(worst, len(exceeded) - 1)
             if suppressed and not LIMITS[name].clips:
-                words += '; forces suppressed'
-            if self._mistake and name in _OF_POSE:
+                words += f'; {self._kind.effort.field} suppressed'
+            if self._mistake and name in self._of_pose:
                 words = f'{self._mistake}; {words}'
             self.held.see(Level(ERROR, words), now, name)
             self._setpoints[name] += 1
@@ -292,24 +315,34 @@ class LimitsDiagnostics(StatusPart):
                       for quantity, numbers in self._of_legs(self._answers.outputs)
                       for leg, number in zip(self._joints, numbers, strict=False)
                       if not math.isnan(number)]
-        if self._largest_force:
+            if self._with_levers:
+                time, leg = _first_dead_centre(self._answers.row[LEVER_TIMES])
+                values += [('time to dead centre (s)', 'none' if time == math.inf
+                            else f'{time:.3f}')]
+                values += [('leg of the time to dead centre', self._joints[leg])] * (
+                    time < math.inf)
+        if self._largest_effort:
+            effort = self._kind.effort
             values += [
-                ('largest force demanded since activation (N)', f'{self._largest_force:.6g}'),
-                ('leg of the largest force demanded', self._joints[self._its_leg])]
+                (f'largest {effort.name} demanded since activation ({effort.unit})',
+                 f'{self._largest_effort:.6g}'),
+                (f'leg of the largest {effort.name} demanded', self._joints[self._its_leg])]
         for name in (each for each in LIMITS if each in self._worst):
             values += [('jumps' if name == JUMP else f'setpoints that exceed {name}',
                         str(self._setpoints[name])),
                        (f'worst since activation, {name}', self._words(self._worst[name]))]
         if self._suppressed:
-            values.append(('setpoints without forces, by limits.action', str(self._suppressed)))
+            values.append((f'setpoints without {self._kind.effort.field}, by limits.action',
+                           str(self._suppressed)))
         return Status(self.name, *self._answers.state(self.held.at(now), 'all held', now), values)
 
     def _of_legs(self, outputs: Outputs) -> list[tuple[str, Array]]:
         """Return each quantity that is computed, with its unit, and six numbers."""
         numbers = {limit: values[0] for limit, values in outputs.values().items()
-                   if limit not in (LENGTH_MIN, TORQUE_SPEED)}
-        return [(f'{LIMITS[limit].quantity.name}{" demanded" * (limit in _DEMANDED)} '
-                 f'({LIMITS[limit].quantity.unit})', each) for limit, each in numbers.items()]
+                   if limit not in (self._kind.position_limits[0], TORQUE_SPEED)}
+        return [(LIMITS[limit].quantity.name + ' demanded' * (limit in self._demanded)
+                 + f' ({LIMITS[limit].quantity.unit})' * bool(LIMITS[limit].quantity.unit), each)
+                for limit, each in numbers.items()]
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """Return the changes of each kind of limit."""
@@ -319,12 +352,22 @@ class LimitsDiagnostics(StatusPart):
             lines += self._changed(level, message or (
                 f'{name}: no longer exceeded; {self._setpoints[name]} setpoints since activation, '
                 f'worst: {self._words(worst)}'), name)
+        if self._with_levers:
+            level, message = self.held.of(_DEAD_CENTRE, now)
+            lines += self._changed(level, message or 'no dead centre predicted', _DEAD_CENTRE)
         return lines
 
     def _words(self, worst: Exceedance, others: int = 0) -> str:
         words = worst.words(self._joints) + ', clipped' * LIMITS[worst.limit].clips
+        if worst.limit == LEVER_MIN:
+            words = f'near a dead centre: {words}'
         return words + (f', and {others} other leg{"s" * (others > 1)}' if others else '')
 
 
 def _excess(exceedance: Exceedance) -> float:
     return exceedance.excess
+
+
+def _first_dead_centre(times: Sequence[float]) -> tuple[float, int]:
+    """Return the shortest time to a dead centre [s], of legs not near one; inf: none; its leg."""
+    return min((time or math.inf, leg) for leg, time in enumerate(times))

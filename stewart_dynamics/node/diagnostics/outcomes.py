@@ -18,6 +18,7 @@ from stewart_dynamics.estimation.confidence_level import INTERVAL
 from stewart_dynamics.external_wrench.estimate import Estimate, Overload, WRENCH_LIMITS
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.external_wrench.payload import Payload, PayloadOutcome, rows_of
+from stewart_dynamics.legs.kind import Named
 from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.node.diagnostics.levels import (
@@ -39,7 +40,7 @@ class ExternalWrenchDiagnostics(StatusPart):
 
     def __init__(self, parameters: Parameters) -> None:
         super().__init__(MISTAKEN, _OVERLOAD, REJECTED)
-        self._joints = parameters.joints
+        self._joints, self._effort = parameters.joints, parameters.leg_kind.effort
         self._timeout = parameters.setpoint.timeout
         # Times of the first and the last message, and of the last one that was not rejected.
         self._begun = self.heard_at = self.used_at = NEVER
@@ -109,10 +110,10 @@ class ExternalWrenchDiagnostics(StatusPart):
                         for part, unit in PARTS_OF_WRENCH.items()),
                       *((key, f'{value:.6g}') for key, value in zip(
                           _COMPONENTS, estimate.wrench, strict=True))]
-            force, leg = max(zip(estimate.differences, self._joints, strict=True),
-                             key=lambda each: abs(each[0]))
-            values += [('largest measured - model force of a leg (N)', f'{force:.6g}'),
-                       ('its leg', leg)]
+            effort, leg = max(zip(estimate.differences, self._joints, strict=True),
+                              key=lambda each: abs(each[0]))
+            values += [(f'largest measured - model {self._effort.name} of a leg '
+                        f'({self._effort.unit})', f'{effort:.6g}'), ('its leg', leg)]
         if self._target is not None:
             distance, angle = _apart(estimate.motion, self._target)
             values += [('distance from the last setpoint (m)', f'{distance:.6g}'),
@@ -196,17 +197,22 @@ class PayloadDiagnostics(_OutcomeDiagnostics):
 
     name = 'payload'
 
+    def __init__(self, parameters: Parameters) -> None:
+        super().__init__()
+        self._effort = parameters.leg_kind.effort
+
     def done(self, outcome: PayloadOutcome, seconds: float) -> None:
         """Note an outcome, and the duration of the task [s]."""
         payload = outcome.payload
         level, message = (OK, f'identified from {payload.seconds:.1f} s') if payload else (
             WARN, f'not identified: {outcome.message}')
         self._last = Status(self.name, level, message, [
-            *(_values_of(payload) if payload else ()), ('time it took (s)', f'{seconds:.3f}')])
+            *(_values_of(payload, self._effort) if payload else ()),
+            ('time it took (s)', f'{seconds:.3f}')])
         self._lines += self._changed(level, message)
 
 
-def _values_of(payload: Payload) -> Values:
+def _values_of(payload: Payload, effort: Named) -> Values:
     fitted, values = payload.fitted, []
     for name, unit, value, half, known in rows_of(fitted):
         values.append((f'{name} ({unit})', f'{value:.6g}'))
@@ -214,4 +220,5 @@ def _values_of(payload: Payload) -> Values:
                        f'{half:.3g}' if known else 'not identified'))
     return [*values,
             ('mass less platform.mass (kg)', f'{fitted.body.mass - payload.given.mass:.6g}'),
-            ('RMS of measured - model force, with these (N)', f'{fitted.residual:.4g}')]
+            (f'RMS of measured - model {effort.name}, with these ({effort.unit})',
+             f'{fitted.residual:.4g}')]

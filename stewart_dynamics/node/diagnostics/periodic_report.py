@@ -40,7 +40,7 @@ class DynamicsDiagnostics:
         self.timing = TimingDiagnostics(self.answers, self.setpoints.rejections)
         self.planned_trajectory = PlannedTrajectoryDiagnostics()
         self.external_wrench = ExternalWrenchDiagnostics(parameters)
-        self.payload = PayloadDiagnostics()
+        self.payload = PayloadDiagnostics(parameters)
         self.parts: list[StatusPart] = [
             self.setpoints, self.singularity, self.limits, self.base, self.timing,
             self.planned_trajectory, self.external_wrench, self.payload]

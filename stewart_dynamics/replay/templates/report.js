@@ -509,7 +509,7 @@ const frames = {
 const placesInFrame = Object.entries(report.frames.places);
 const NUMBERS = Math.max(...placesInFrame.map(([, [, end]]) => end));
 
-// Position, rotation, angles, lengths and forces.
+// Position, rotation, angles, positions and efforts of the drives, anchors of moving lines of force.
 function frameAt(number) {
   return Object.fromEntries(placesInFrame.map(
     ([name, [begin, end]]) => [name, frames.numbers.subarray(NUMBERS * number + begin, NUMBERS * number + end)]));
@@ -522,6 +522,7 @@ function platformJoints(frame) {
       + frame.rotation[3 * k + 2] * p[2]));
 }
 
+const inUnit = quantity => `${quantity.name} [${quantity.unit}]`;
 const column = (points, k) => points.map(point => point[k]);
 const xyz = points => ({x: column(points, 0), y: column(points, 1), z: column(points, 2)});
 const SILENT = {hoverinfo: 'skip', showlegend: false};
@@ -537,12 +538,14 @@ function plate(points, of, opacity) {
 }
 
 // The legs as one line with gaps, and a number for the color of each of its points.
-function legLines(joints) {
-  return xyz(report.baseJoints.flatMap((base, n) => [base, joints[n], [null, null, null]]));
+function legLines(joints, frame) {
+  return xyz(report.baseJoints.flatMap((base, n) => [
+    base, ...(frame.anchors ? [[...frame.anchors.subarray(3 * n, 3 * n + 3)]] : []), joints[n], [null, null, null]]));
 }
 
 function legColors(frame) {
-  return [...frame.forces].flatMap(force => Array(3).fill(Number.isFinite(force) ? force : 0));
+  return [...frame.efforts].flatMap(
+    effort => Array(frame.anchors ? 4 : 3).fill(Number.isFinite(effort) ? effort : 0));
 }
 
 // A narrow scene is seen from farther away.
@@ -610,11 +613,11 @@ function drawScene(canvas, traces, numbers, below = 0) {
     paper_bgcolor: PAPER}, CONFIG_3D);
 }
 
-// The force at the end of the color scale; a few spikes do not set it.
+// The effort at the end of the color scale; a few spikes do not set it.
 function colorReach() {
   const sizes = [];
   for (let n = 0; n < frames.times.length; n++) {
-    for (const force of frameAt(n).forces) if (Number.isFinite(force)) sizes.push(Math.abs(force));
+    for (const effort of frameAt(n).efforts) if (Number.isFinite(effort)) sizes.push(Math.abs(effort));
   }
   if (!sizes.length) return 1;
   sizes.sort((a, b) => a - b);
@@ -630,7 +633,7 @@ class Player extends Drawing {
     this.wanted = 0;
     this.busy = false;
     this.reach = colorReach();
-    this.legValues = listIn(this.readout, ['leg', 'force [N]', 'length [m]'],
+    this.legValues = listIn(this.readout, ['leg', inUnit(report.effort), inUnit(report.position)],
       report.legs.map((name, n) => [swatch(color(`leg${n}`)), name]));
     this.poseValues = listIn(this.readout, ['platform', ''],
       ['X [m]', 'Y [m]', 'Z [m]', 'alpha [deg]', 'beta [deg]', 'gamma [deg]']);
@@ -650,9 +653,9 @@ class Player extends Drawing {
     drawScene(this.canvas, [
       plate(joints, PLATFORM, 0.45),
       outline(joints, {line: {color: PLATFORM_EDGE, width: 5}, marker: {size: 4, color: PLATFORM_EDGE}}),
-      {type: 'scatter3d', mode: 'lines', ...legLines(joints), ...SILENT, connectgaps: false,
+      {type: 'scatter3d', mode: 'lines', ...legLines(joints, frame), ...SILENT, connectgaps: false,
         line: {width: 13, color: legColors(frame), colorscale: FORCE_SCALE, cmin: -this.reach, cmax: this.reach,
-          showscale: true, colorbar: {title: {text: narrow ? 'leg force [N], + pushes' : 'leg force [N]<br>+ pushes', side: 'top'},
+          showscale: true, colorbar: {title: {text: `leg ${inUnit(report.effort)}${narrow ? ', ' : '<br>'}${report.effort.positive}`, side: 'top'},
             thickness: 14, outlinewidth: 0, separatethousands: true, exponentformat: 'none',
             ...(narrow ? {orientation: 'h', len: 0.9, nticks: 5, x: 0.5, y: 0, yanchor: 'top'} : {len: 0.7, x: 1})}}},
     ], frames.times.keys(), narrow ? 70 : 0);
@@ -676,7 +679,7 @@ class Player extends Drawing {
 
   async take(number) {
     const frame = frameAt(number), joints = platformJoints(frame);
-    const places = [xyz(joints), xyz([...joints, joints[0]]), legLines(joints)];
+    const places = [xyz(joints), xyz([...joints, joints[0]]), legLines(joints, frame)];
     this.frame = number;
     this.showValues(number);
     await Plotly.restyle(this.canvas, {
@@ -686,9 +689,9 @@ class Player extends Drawing {
 
   showValues(number) {
     const frame = frameAt(number);
-    this.legValues.forEach(([force, length], n) => {
-      force.textContent = Number.isFinite(frame.forces[n]) ? shown(frame.forces[n]) : 'none';
-      length.textContent = shown(frame.lengths[n]);
+    this.legValues.forEach(([effort, position], n) => {
+      effort.textContent = Number.isFinite(frame.efforts[n]) ? shown(frame.efforts[n]) : 'none';
+      position.textContent = shown(frame.positions[n]);
     });
     const pose = [...frame.position, ...frame.angles];
     this.poseValues.forEach(([cell], n) => { cell.textContent = shown(pose[n]); });
@@ -710,9 +713,9 @@ class InitialAndFinal extends Drawing {
     if (this.drawn) return;
     this.drawn = true;
     drawScene(this.canvas, this.ends.flatMap(([number, of, width]) => {
-      const joints = platformJoints(frameAt(number)), line = {color: of, width};
+      const frame = frameAt(number), joints = platformJoints(frame), line = {color: of, width};
       return [plate(joints, of, 0.4), outline(joints, {line, marker: {size: 4, color: of}}),
-        {type: 'scatter3d', mode: 'lines', ...legLines(joints), ...SILENT, line}];
+        {type: 'scatter3d', mode: 'lines', ...legLines(joints, frame), ...SILENT, line}];
     }), column(this.ends, 0));
   }
 }

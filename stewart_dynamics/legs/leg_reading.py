@@ -13,7 +13,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.legs.mechanism import (
-    BALL, Chain, HERE, HINGE, Joint, joined, LegJoint, MechanismBody, UNIVERSAL)
+    BALL, Chain, HERE, HINGE, joined, Joint, LegJoint, MechanismBody, UNIVERSAL)
 
 if TYPE_CHECKING:
     from stewart_dynamics.legs.kind import LegKind
@@ -132,7 +132,7 @@ def limits_of(kind: LegKind, joint: Joint, zero: float, sign: float, least: floa
 
 
 def slender_body(part: str, bodies: list[MechanismBody], start: Array, way: Array, length: float,
-             said: list[str]) -> dict[str, Any]:
+                 said: list[str]) -> dict[str, Any]:
     """Return mass, center and transverse inertia of a leg's bodies along its line."""
     body = joined(bodies, HERE)
     name = f'legs.{part}'
