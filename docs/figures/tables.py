@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
-from stewart_dynamics.legs import KINDS, TELESCOPIC
+from stewart_dynamics.legs import CRANK, KINDS, TELESCOPIC
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.circles import circle_names
@@ -328,6 +328,10 @@ def pages() -> dict[Path, dict[str, str]]:
             'parameters of motion cueing': rows({
                 name: parameter for name, parameter in Parameters.table.items()
                 if name.startswith('cueing.')})},
+        ROOT / 'docs' / 'cranks.md': {
+            'parameters of cranks': rows({
+                name: parameter for name, parameter in Parameters.table.items()
+                if name.startswith(CRANK.own)})},
         ROOT / 'docs' / 'simulator.md': {
             'errors in the loop': loop(figures), 'errors on a ship': ship(on_a_ship)},
         ROOT / 'docs' / 'identify_from_bags.md': {

@@ -236,6 +236,7 @@ static double crank_lever_time(
   if (!(left > 0.0)) {return 0.0;}
   return rate < 0.0 ? -left / rate : HUGE_VAL;
 }
+static int crank_given(const stewart_leg * leg) {return leg->crank_length > 0.0;}
 
 /* The rod as two points with a coupling, and the crank with the point at its end: exact where the
    rod has no inertia about its own axis. */
@@ -320,10 +321,32 @@ static double crank_position(
   return crank_angle(leg, &at);
 }
 
+/* (k / L1)' = n . B' / L2 - q' (L1 / L2 + d . e): no division by k. */
+static lever_slope crank_slope_at(const stewart_leg * leg, const crank_pose * at) {
+  lever_slope of;
+  double size = leg->crank_length, rod = leg->rod_length;
+  of.ratio = leg->branch * at->line.lever / size;
+  of.of_drive = -leg->branch * (size / rod + dot(at->line.direction, at->along));
+  of.of_joint = scale(leg->branch / rod, at->normal);
+  return of;
+}
+
+static lever_slope crank_slope(
+  const stewart_leg * leg, const double position[3], const double r[9]) {
+  crank_pose at = crank_pose_of(leg, position, r);
+  return crank_slope_at(leg, &at);
+}
+
+/* The lever is one of what changes, by its own magnitude: in half of it a step does not come to the
+   dead centre, and not from one side of it to the other. */
 static measured_leg crank_measured(const stewart_leg * leg, const stewart_motion * motion) {
   crank_motion of = crank_motion_of(leg, motion);
+  lever_slope lever = crank_slope_at(leg, &of.at);
+  double lever_rate = lever.of_drive * of.drive.rate + dot(lever.of_joint, of.end_rate);
   double pace = largest(fabs(of.drive.rate), norm(of.end_rate) / leg->rod_length);
-  measured_leg to = {of.drive.position, of.drive.rate, pace < HUGE_VAL ? pace : HUGE_VAL};
+  if (lever_rate != 0.0) {pace = largest(pace, fabs(lever_rate) / lever.ratio);}
+  measured_leg to = {of.drive.position, of.drive.rate, HUGE_VAL};
+  if (lever.ratio >= 0.0 && pace < HUGE_VAL) {to.pace = pace;}
   return to;
 }
 

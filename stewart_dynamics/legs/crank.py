@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -14,8 +14,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.legs import crank_tree as tree
-from stewart_dynamics.legs.kind import LegKind, LegMass, Named, Placed, Solid, STANDARD_G
+from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
+from stewart_dynamics.legs.kind import (
+    AtHome, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import (
     AnchorCircles, AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
@@ -32,6 +33,9 @@ COULOMB_VELOCITY = 0.01
 HEADINGS, AXES, DIRECTIONS = (
     'geometry.crank_angles', 'geometry.crank_axes', 'geometry.crank_directions')
 _LEVERS = places('stewart_result')['levers']
+# A stop near a dead centre is expected to end motions before half of its lever, or before this.
+_DEEPEST = 0.5
+_LEAST_LEVER = 0.01
 _UPRIGHT = 0.5 * math.pi  # from its zero, farther than which no crank is at home by itself [rad]
 
 
@@ -50,6 +54,9 @@ class Crank(LegKind):
     lever_limit, ends_differ = 'limits.lever_min', True
     joint_force, joint_force_limit = 'rod_force', 'limits.rod_force_max'
     commands = 'torques'
+    simulated = 'leg_torque'
+    resolved = ('a crank turns by more than that, a joint moves by more than that part of its '
+                'rod, or a lever changes by more than that part of itself, as at a dead centre')
     gear, right_sign = 'gear', '+ must drive the angle up'
     wrong_units = (
         (1e-3, 'kN m in place of N m'), (1.0 / STANDARD_G, 'kgf m in place of N m'),
@@ -58,7 +65,7 @@ class Crank(LegKind):
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
-           'limits.lever_min')
+           'limits.lever_min', 'noise.angle', 'noise.speed', 'noise.torque')
     fields = {
         'crank_length': 'legs.crank.length', 'rod_length': 'legs.rod.length',
         'crank_axis': AXES, 'crank_direction': DIRECTIONS, 'crank_mass': 'legs.crank.mass',
@@ -82,6 +89,7 @@ class Crank(LegKind):
     shortened = HEADINGS,
     likely = {'geometry.crank_branch': (AUTO,)}
     inertia_unit = 'kg m^2'
+    reflected, rotors = 'N^2 J', 'rotor and gear'
     friction_units = 'N m s/rad', 'N m'
     bodies = {'crank': 'legs.crank.mass', 'rod': 'legs.rod.mass'}
     alternatives = (HEADINGS,), (AXES, DIRECTIONS)
@@ -251,17 +259,61 @@ class Crank(LegKind):
         on_legs: Array = forces + torque * r
         return on_legs
 
-    def home_rule(self, parameters: Parameters) -> str:
-        """Return that the rods are shorter than the gap, or far too long."""
+    def stop_loads(self, parameters: Parameters) -> StopLoads:
+        """
+        Return the inertias of shafts and cranks, and the rods, which move with the platform.
+
+        The rod can have no energy but a positive one, so that shaft and crank alone are a bound of
+        the inertia of a drive. Of the slope of a lever, (k / L1)' = n . B' / L2 - q' (L1 / L2 +
+        d . e), the second part is at most c = 1 + L1 / L2 by the rate of the drive, and by
+        (a + b)^2 <= 1.25 a^2 + 5 b^2 the stop near a dead centre adds 1.25 c^2 to the stiffness at
+        the drive and 5 / L2^2 to that at the joint.
+        """
+        centers, inertias = crank_bodies(parameters)
+        mass = parameters['legs.crank.mass']
+        size, rods = parameters['legs.crank.length'], parameters['legs.rod.length']
+        inertia = (parameters['actuator.reflected_inertia'] + inertias[:, 5]
+                   + mass * np.sum(centers[:, :2] ** 2, axis=-1))
+        least = np.maximum(_DEEPEST * parameters['limits.lever_min'], _LEAST_LEVER)
+        return StopLoads(
+            inertia, float(np.sum(parameters['legs.rod.mass'])), (least * size, size),
+            1.0 + 1.25 * (1.0 + size / rods) ** 2, 5.0 / rods ** 2)
+
+    def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
+                      ratios: Sequence[float]) -> str:
+        """Return the leg that is nearest to a dead centre."""
+        leg = int(np.argmin(ratios))
+        return f'smallest lever: {joints[leg]}, {ratios[leg]:.3g} of its largest'
+
+    def reach(self, parameters: Parameters) -> Array:
+        """Return the lengths of the cranks."""
+        size: Array = parameters['legs.crank.length']
+        return size
+
+    def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[str]:
+        """Yield lengths in mm, and rods that are shorter than the gap at home."""
+        return crank_mistakes.wrong_sizes(parameters, anchors)
+
+    def likely_mistakes(self, parameters: Parameters, home: AtHome) -> Iterator[str]:
+        """Yield mistakes in signs and zeros of the cranks, their masses and limits."""
+        at = self.lines(parameters, home.position, home.rotation)
+        if not np.isfinite(at.directions).all():
+            return iter(())
         legs: Any = parameters.structure['legs']
-        with np.errstate(all='ignore'):
-            ends = crank_ends(parameters, legs['home_position'])
-        joints = parameters.geometry.platform_joints
-        gaps = np.linalg.norm(ends - ends.mean(axis=0) - joints + joints.mean(axis=0), axis=1)
+        position = crank_mistakes.above_motors(parameters, home)
+        both = [_angles_at(parameters, leg, position, home.rotation) for leg in range(6)]
+        angles = np.array([math.nan if each is None else each[0 if sign > 0.0 else 1]
+                           for each, sign in zip(both, legs['branch'], strict=True)])
+        return crank_mistakes.likely_mistakes(
+            parameters, home, angles, at.levers(), crank_bodies(parameters))
+
+    def home_rule(self, parameters: Parameters, anchors: Array) -> str:
+        """Return that the rods are shorter than the gap, or far too long."""
+        gap = crank_mistakes.gap_of(parameters, anchors)
         rods = np.unique(parameters['legs.rod.length'])
         return (f'legs.rod.length: {shown(rods.tolist())} m: no level pose has rods of this length'
                 ': while the platform joints are level with the ends of the cranks, at the '
-                f'middle of their angles, they are {np.mean(gaps):.3g} m away from them')
+                f'middle of their angles, they are {gap:.3g} m away from them')
 
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
@@ -436,12 +488,6 @@ def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
     else:
         inertias[:] = given
     return centers, inertias
-
-
-def _unit(vectors: Array) -> Array:
-    with np.errstate(all='ignore'):
-        units: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return units
 
 
 def crank_ends(parameters: Parameters, angles: Array) -> Array:
