@@ -61,8 +61,8 @@ CONTROLLER = (
               'linear_acceleration.x .. are the readings where base.source is imu', '', ''))
 
 PAYLOAD = {each: f'payload.{each}' for each in ('mass', 'center_of_mass', 'inertia')}
-# Parameters of the node that the controller reads: all that the structure in C holds, the names
-# from which parts of it follow, and the IMU; not the pulses of servos.
+# Parameters of the node that the controller reads: those that the structure in C holds or follows
+# from, and the IMU; not the pulses of servos, which hardware interfaces take.
 CONTROLLER_NAMES = ('joints', 'base_frame', *(
     name for fields in (PLATFORM_FIELDS, PAYLOAD, LEG_FIELDS, *(
         kind.fields for kind in KINDS), LISTS)

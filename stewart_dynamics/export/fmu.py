@@ -105,8 +105,7 @@ def variables(parameters: Parameters) -> list[Variable]:
 
 def has_levers(kind: LegKind) -> bool:
     """Return whether results of a kind of legs have levers."""
-    levers: slice = places('stewart_result')['levers']
-    return bool(levers.stop <= kind.width)
+    return bool(places('stewart_result')['levers'].stop <= kind.width)
 
 
 def _start_pose(parameters: Parameters) -> tuple[Array, Array]:
