@@ -89,6 +89,7 @@ INPUTS: dict[str, Any] = {
 # Their stamps are those of the answers.
 FIRST = ('setpoint/pose', 'setpoint/combined')
 
+
 def outputs_of(kind: LegKind) -> dict[str, Any]:
     """Return the topics of answers of hexapods with a kind of legs."""
     return {'leg_states': JointState,

@@ -78,8 +78,8 @@ def _words(recent: Sequence[Measurement], joints: Sequence[str], late: str, unit
         wrong[:] = True
     of = '' if wrong.all() else ', '.join(
         name for name, is_wrong in zip(joints, wrong, strict=True) if is_wrong) + ': '
-    by_rates, by_positions = (float(np.sqrt(each[wrong].mean() / np.sum(seconds ** 2)))
-                            for each in (all_given, moved))
+    by_rates, by_positions = (
+        float(np.sqrt(each[wrong].mean() / np.sum(seconds ** 2))) for each in (all_given, moved))
     reason = _reason(expected[:, wrong], given[:, wrong], float(np.mean(steps)))
     if not reason and (order := _order(expected, given)):
         reason = f'in another order, {", ".join(joints[n] for n in order)}?'
