@@ -115,8 +115,9 @@ demo: $(INSTALLED)
 demo-cueing: $(INSTALLED)
 	@$(VENV)/bin/python demo/cueing.py
 
+# LEGS=crank: six gear motors with cranks in place of telescopic legs.
 demo-loop: $(INSTALLED)
-	@$(VENV)/bin/python demo/loop.py
+	@$(VENV)/bin/python demo/loop.py $(if $(LEGS),--legs $(LEGS))
 
 demo-mujoco: $(INSTALLED)
 	@$(VENV)/bin/python demo/mujoco_loop.py
@@ -179,6 +180,7 @@ docs: $(TOOLS)
 	$(VENV)/bin/python docs/figures/misprints.py
 	$(VENV)/bin/python docs/figures/draw.py
 	$(VENV)/bin/python docs/figures/hexapod.py
+	$(VENV)/bin/python docs/figures/cranks.py
 	$(VENV)/bin/python docs/figures/tables.py
 	$(VENV)/bin/python demo/cueing.py --output docs/figures/motion_cueing.png
 

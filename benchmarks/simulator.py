@@ -205,11 +205,11 @@ def balance_of_a_minute(step: float) -> float:
     state, before = plant.state, energy_of(plant)
     work = exchanged = 0.0
     for n in range(len(times)):
-        lengths = np.array(state.lengths)
+        lengths = np.array(state.positions)
         forces = (wanted.forces[n] + 400.0 * carried * (wanted.lengths[n] - lengths)
                   + 30.0 * carried * (wanted.rates[n] - state.rates))
         state = plant.advance(tuple(forces.tolist()), NO_WRENCH)
-        of_legs = forces * (state.lengths - lengths)
+        of_legs = forces * (state.positions - lengths)
         work += float(np.sum(of_legs))
         exchanged += float(np.sum(np.abs(of_legs)))
     return abs(energy_of(plant) - before - work) / exchanged

@@ -34,6 +34,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.messages.setpoint import pose
 from stewart_dynamics.whole_file import write_files
@@ -63,6 +64,12 @@ UNITS = {**{f'leg {n}': 'um' for n in range(1, 7)}, 'all legs': 'um', 'position'
          'rotation': 'urad'}
 
 
+def units(kind: LegKind) -> dict[str, str]:
+    """Return the units of the errors of hexapods with a kind of legs."""
+    return {name: f'u{kind.position.unit}' if 'leg' in name else unit
+            for name, unit in UNITS.items()}
+
+
 class Failure(Exception):
     """Ends the demo; its text is one line."""
 
@@ -73,7 +80,7 @@ class Errors(NamedTuple):
     seconds: Array
     """Since the start of the motion (N,)."""
     legs: Array
-    """Of the lengths (N, 6) [um]."""
+    """Of the lengths (N, 6) [um], or of the angles of the drives [urad]."""
     position: Array
     """Distance of the platform's origin (N,) [um]."""
     rotation: Array
@@ -266,8 +273,8 @@ def simulate(commands: Mapping[str, Sequence[str | Path]], files: Mapping[str, S
 
 
 def leg_mass(platform: StewartPlatform, motion: Motion) -> float:
-    """Return the mass that one leg moves alone [kg], the mean of the six."""
-    to_legs = np.linalg.inv(platform.inverse_jacobian(motion))
+    """Return the mass that one leg moves alone [kg, kg m^2], the mean of the six."""
+    to_legs = np.linalg.inv(platform.drive_jacobian(motion))
     masses = to_legs.T @ platform.mass_matrix(motion) @ to_legs
     return float(np.mean(np.diag(masses)))
 

@@ -5,9 +5,10 @@
 Run a controller in the loop with a simulated hexapod, and print the tracking errors.
 
 ``make demo-loop`` runs it: reference motion, node, simulator and examples/leg_controller.py, each
-in its own process, over ROS 2 topics; four times: without and with the node's forces as
-feed-forward, with the payload of the parameters and with more. The simulator owns time and waits
-for each command, so that no figure depends on the load of the computer.
+in its own process, over ROS 2 topics; four times: without and with the node's forces, or
+torques of cranks (``LEGS=crank``), as feed-forward, with the payload of the parameters and with
+more. The simulator owns time and waits for each command, so that no figure depends on the load of
+the computer.
 """
 
 from __future__ import annotations
@@ -22,13 +23,14 @@ from typing import Any, NamedTuple
 
 from closed_loop import (
     BANDWIDTH, demonstration, Errors, Failure, leg_mass, PLOTS, Progress, Recorder, ROOT,
-    save, simulate, UNITS)
+    save, simulate, units)
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 import rclpy
 from stewart_dynamics import StewartPlatform
 from stewart_dynamics.executables import executable
+from stewart_dynamics.legs import KINDS, LegKind, TELESCOPIC
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
@@ -41,6 +43,9 @@ Array = NDArray[np.float64]
 
 RATE = 1000.0  # of setpoints, states and commands [Hz]
 HEAVIER = 1.3
+# Hexapod and motion by the kind of legs.
+FILES = {'telescopic': ('platform.yaml', 'trajectory_loop.yaml'),
+         'crank': ('crank_platform.yaml', 'trajectory_cranks.yaml')}
 
 # Started in this order; the last one, which starts the motion, when the others are connected.
 PROGRAMS: dict[str, list[str | Path]] = {
@@ -96,7 +101,8 @@ class Loop:
         start = motion_at(settings, 0.0)
         if np.abs([start.linear_velocity, start.angular_velocity]).max() > 1e-9:
             raise Failure(f'{motion}: must begin at rest, as the simulator does')
-        self.bandwidth, self.leg_mass = bandwidth, leg_mass(platform, start)
+        self.kind, self.bandwidth = parameters.leg_kind, bandwidth
+        self.leg_mass = leg_mass(platform, start)
         omega = 2.0 * math.pi * bandwidth
         self.gains = {'proportional_gain': self.leg_mass * omega ** 2,
                       'derivative_gain': 2.0 * self.leg_mass * omega}
@@ -166,12 +172,13 @@ def payload_name(payload: float) -> str:
     return f'payload {more:+.0f} %' if more else 'as in the parameters'
 
 
-def table(runs: Sequence[Run], titles: Sequence[str]) -> str:
+def table(runs: Sequence[Run], titles: Sequence[str], kind: LegKind = TELESCOPIC) -> str:
     """Return the table of all runs: without and with feed-forward, each pair with its title."""
     pairs = list(zip(runs[::2], runs[1::2], strict=True))
     lines = ['tracking error        ' + ''.join(f'{title:^39}' for title in titles),
-             'RMS (peak)            ' + f'{"PD only":>16}{"PD + forces":>16}{"":7}' * len(pairs)]
-    for name, unit in UNITS.items():
+             'RMS (peak)            '
+             + f'{"PD only":>16}{forward_name(kind):>16}{"":7}' * len(pairs)]
+    for name, unit in units(kind).items():
         line = f'{name:12}{unit:>5}     '
         for pd, forward in pairs:
             line += ''.join(f' {each.errors.rms[name]:8.1f} {_peak(each.errors.peak[name]):>6}'
@@ -181,12 +188,25 @@ def table(runs: Sequence[Run], titles: Sequence[str]) -> str:
     return '\n'.join(lines)
 
 
+def forward_name(kind: LegKind) -> str:
+    """Return the name of a run with feed-forward."""
+    return f'PD + {kind.effort.field}'
+
+
+def last_line(runs: Sequence[Run], kind: LegKind) -> str:
+    """Return the errors of the legs without and with feed-forward, as in the parameters."""
+    alone, forward = (run.errors.rms['all legs'] for run in runs[:2])
+    unit = units(kind)['all legs']
+    return (f'RMS error of the leg {kind.position.field}: {alone:.1f} {unit} by PD alone, '
+            f'{forward:.1f} {unit} with the {kind.effort.field} of the node')
+
+
 def _peak(value: float) -> str:
     """Return a peak in parentheses; a small one with a decimal, as the RMS before it."""
     return f'({value:.{0 if value >= 100.0 else 1}f})'
 
 
-def draw(path: Path, runs: Sequence[Run]) -> None:
+def draw(path: Path, runs: Sequence[Run], kind: LegKind) -> None:
     """Draw the errors of the legs over time, without and with feed-forward."""
     pyplot.rcParams.update(PLOTS)
     figure, panels = pyplot.subplots(1, 2, figsize=(11, 4), sharey=True, layout='constrained')
@@ -194,10 +214,12 @@ def draw(path: Path, runs: Sequence[Run]) -> None:
         for run, color in zip(pair, ('#d55e00', '#0072b2'), strict=True):
             errors = np.sqrt(np.mean(np.square(run.errors.legs), axis=1))
             axes.plot(run.errors.seconds, errors, color=color, linewidth=1.2,
-                      label='PD and the forces of the node' if run.feed_forward else 'PD only')
+                      label=f'PD and the {kind.effort.field} of the node' if run.feed_forward
+                      else 'PD only')
         axes.set(title=payload_name(pair[0].payload), xlabel='time  [s]', yscale='log',
                  xlim=(0.0, run.errors.seconds[-1]))
-    panels[0].set_ylabel('error of the leg lengths, RMS of six  [µm]')
+    panels[0].set_ylabel(
+        f'error of the leg {kind.position.field}, RMS of six  [µ{kind.position.unit}]')
     panels[0].legend(frameon=False)
     save(figure, path)
 
@@ -205,7 +227,8 @@ def draw(path: Path, runs: Sequence[Run]) -> None:
 def summary(loop: Loop, runs: Sequence[Run]) -> dict[str, Any]:
     """Return the figures of all runs."""
     return {'setpoints': len(loop.times), 'rate [Hz]': RATE, 'bandwidth [Hz]': loop.bandwidth,
-            'leg mass [kg]': loop.leg_mass, **loop.gains, 'units': UNITS,
+            f'leg mass [{loop.kind.inertia_unit}]': loop.leg_mass, **loop.gains,
+            'units': units(loop.kind),
             'runs': [{'feed_forward': run.feed_forward, 'payload': run.payload,
                       'rms': run.errors.rms, 'peak': run.errors.peak} for run in runs]}
 
@@ -213,9 +236,10 @@ def summary(loop: Loop, runs: Sequence[Run]) -> dict[str, Any]:
 def main() -> None:
     """Run the loop four times, print the table, draw the plot."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument('--params', type=Path, default=ROOT / 'config' / 'platform.yaml',
-                        help='parameter file of the hexapod')
-    parser.add_argument('--motion', type=Path, default=ROOT / 'config' / 'trajectory_loop.yaml',
+    parser.add_argument('--legs', choices=[kind.name for kind in KINDS], default=TELESCOPIC.name,
+                        help='legs of the hexapod where no files are given')
+    parser.add_argument('--params', type=Path, help='parameter file of the hexapod')
+    parser.add_argument('--motion', type=Path,
                         help='parameter file of the motion, which must begin at rest')
     parser.add_argument('--seconds', type=float, default=10.0, help='duration of the motion [s]')
     parser.add_argument('--bandwidth', type=float, default=BANDWIDTH,
@@ -224,24 +248,28 @@ def main() -> None:
                         help='folder for loop.json and loop.png')
     options = parser.parse_args()
     runs: list[Run] = []
+    hexapod, motion = (ROOT / 'config' / name for name in FILES[options.legs])
     with demonstration('demo-loop'):
-        loop = Loop(options.params, options.motion, options.seconds, options.bandwidth)
+        loop = Loop(options.params or hexapod, options.motion or motion, options.seconds,
+                    options.bandwidth)
+        kind, unit = loop.kind, f'{loop.kind.effort.unit}/{loop.kind.position.unit}'
         options.output.mkdir(parents=True, exist_ok=True)
         rclpy.init()
-        print(f'each leg: {loop.bandwidth:g} Hz, damping ratio 1, with the {loop.leg_mass:.0f} kg '
-              f'that it moves alone: {loop.gains["proportional_gain"]:.3g} N/m, '
-              f'{loop.gains["derivative_gain"]:.3g} N s/m', flush=True)
+        print(f'each leg: {loop.bandwidth:g} Hz, damping ratio 1, with the {loop.leg_mass:.3g} '
+              f'{kind.inertia_unit} that it moves alone: {loop.gains["proportional_gain"]:.3g} '
+              f'{unit}, {loop.gains["derivative_gain"]:.3g} {kind.friction_units[0]}', flush=True)
         begun = time.monotonic()
         with Progress(4 * options.seconds) as progress:
             for payload in (1.0, HEAVIER):
                 for feed_forward in (False, True):
-                    name = 'PD + forces' if feed_forward else 'PD only'
+                    name = forward_name(kind) if feed_forward else 'PD only'
                     progress.stage(f'{name}, {payload_name(payload)}', options.seconds)
                     runs.append(loop.run(feed_forward, payload, progress.reached))
-        print(f'\n{table(runs, [payload_name(run.payload) for run in runs[::2]])}\n')
-        draw(options.output / 'loop.png', runs)
+        print(f'\n{table(runs, [payload_name(run.payload) for run in runs[::2]], kind)}\n')
+        draw(options.output / 'loop.png', runs, kind)
         write_json(options.output / 'loop.json', summary(loop, runs))
         print(f'{time.monotonic() - begun:.0f} s; {options.output}: loop.png, loop.json')
+        print(last_line(runs, kind))
 
 
 if __name__ == '__main__':

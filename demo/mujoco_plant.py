@@ -25,7 +25,7 @@ from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.simulator.plant import PlantState
 from stewart_dynamics.simulator.simulator_node import SimulatorNode
-from stewart_dynamics.simulator.simulator_parameters import FORCE, SimulatorParameters
+from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 # Coordinates of the MJCF: three of each leg, then the platform's free joint.
 _LEGS, _POSITION, _QUATERNION = slice(2, 18, 3), slice(18, 21), slice(21, 25)
@@ -36,8 +36,9 @@ class MuJoCoPlant:
     """The hexapod in MuJoCo, with the calls of ``stewart_dynamics.simulator.plant.Plant``."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
-        if parameters.commands != FORCE:
-            raise ParameterError(f'commands: {parameters.commands}: must be {FORCE} in MuJoCo')
+        simulated = parameters.leg_kind.simulated
+        if parameters.commands != simulated:
+            raise ParameterError(f'commands: {parameters.commands}: must be {simulated} in MuJoCo')
         self.parameters = parameters
         self.fault = ''
         self._model = mujoco.MjModel.from_xml_string(mjcf(Hexapod(parameters), 'hexapod'))
@@ -52,7 +53,7 @@ class MuJoCoPlant:
         qpos[_POSITION] = pose[:3]
         qpos[_QUATERNION] = np.roll(to_quaternion(rotation), 1)
         mujoco.mj_forward(self._model, self._data)
-        self.state = self._now()._replace(acceleration=NO_WRENCH, forces=NO_WRENCH)
+        self.state = self._now()._replace(acceleration=NO_WRENCH, efforts=NO_WRENCH)
 
     def advance(self, commands: Six, wrench: Six, base: Array | None = None) -> PlantState:
         """Return the state one period later, under the commands [N]."""

@@ -11,12 +11,13 @@ It is not a part of the package, which computes forces and controls nothing. For
 with measured length q and rate v, and q_d, v_d, effort_d as published by stewart_dynamics. When
 these stop, it holds the last q_d at rest, with the forces that carry the weight there. After that,
 after any other gap, and at the start, the hexapod is elsewhere: it goes from the measured lengths
-to the desired ones within RETURN_SPEED. Forces are at most limits.force_max of params_file.
+to the desired ones within RETURN_SPEED. Forces are at most limits.force_max of params_file. Of
+cranks q is the angle and the force is the torque of the shaft, at most limits.torque_max.
 
 With use_sim_time the simulation waits for each command, so that there are no gaps.
 
-Its parameters are those of ROS: --ros-args -p params_file:=FILE, proportional_gain [N/m],
-derivative_gain [N s/m], timeout [s], feed_forward. Gains that are not given follow from
+Its parameters are those of ROS: --ros-args -p params_file:=FILE, proportional_gain [N/m, N m/rad],
+derivative_gain [N s/m, N m s/rad], timeout [s], feed_forward. Gains that are not given follow from
 params_file: 8 Hz and a damping ratio of 1 with the mass that a leg moves at home while the other
 five are held.
 """
@@ -46,7 +47,7 @@ from stewart_dynamics.ros.transports import leave_shared_memory
 FREQUENCY, DAMPING_RATIO = 8.0, 1.0  # [Hz], 1
 # By the same rule, with the 160 kg of config/platform.yaml 1.1 m above its base.
 EXAMPLE_GAINS = 4.0e5, 1.6e4
-RETURN_SPEED, RETURN_TIME = 0.1, 0.5  # to the desired lengths: at most [m/s], at least [s]
+RETURN_SPEED, RETURN_TIME = 0.1, 0.5  # to what is desired: at most [m/s, rad/s], at least [s]
 PATIENCE = 2.0  # with use_sim_time: a longer wait is logged, and then every 5 s [s]
 REPEATS = 20  # of a state that was answered: the simulator has lost the answer, or is a new one
 
@@ -54,7 +55,7 @@ REPEATS = 20  # of a state that was answered: the simulator has lost the answer,
 def gains(platform: StewartPlatform) -> tuple[float, float]:
     """Return proportional [N/m] and derivative gain [N s/m] for the largest mass of a leg."""
     home = platform.home_pose()
-    to_twist = np.linalg.inv(platform.inverse_jacobian(home))
+    to_twist = np.linalg.inv(platform.drive_jacobian(home))
     # The mass that a leg moves while the other five are held.
     mass = np.diag(to_twist.T @ platform.mass_matrix(home) @ to_twist).max()
     omega = 2.0 * math.pi * FREQUENCY
@@ -95,8 +96,10 @@ class LegController(Node):
         self.followed_at, self.offset = -math.inf, 0.0  # real time; [m] from the desired lengths
         self.repeats, self.waits_since = 0, time.monotonic()  # with use_sim_time
         self.force_max = np.inf
-        if self.platform and self.platform.parameters.limits.force_max is not None:
-            self.force_max = self.platform.parameters.limits.force_max
+        if self.platform:
+            limit = self.platform.parameters.leg_kind.effort_limit
+            if self.platform.parameters[limit] is not None:
+                self.force_max = self.platform.parameters[limit]
         self.commands = self.create_publisher(
             Float64MultiArray, 'stewart_simulator/commands', 1)
         self.create_subscription(
@@ -126,9 +129,9 @@ class LegController(Node):
         platform = StewartPlatform.from_yaml(file)
         self.zero_length = platform.parameters.geometry.zero_length
         self.guess = platform.home_pose()
-        lengths = platform.inverse_kinematics(self.guess)
+        positions = platform.inverse_kinematics(self.guess)
         platform.inverse_dynamics(
-            Motion.from_pose(platform.forward_kinematics(lengths, self.guess)))
+            Motion.from_pose(platform.forward_kinematics(positions, self.guess)))
         return platform
 
     def on_measured(self, state: JointState) -> None:
@@ -164,7 +167,8 @@ class LegController(Node):
             if self.platform:
                 pose = self.platform.forward_kinematics(
                     position + self.zero_length, self.guess)
-                effort = self.platform.inverse_dynamics(Motion.from_pose(pose)).forces
+                at_rest = self.platform.inverse_dynamics(Motion.from_pose(pose))
+                effort = getattr(at_rest, self.platform.parameters.leg_kind.effort.field)
         except StewartError as exc:
             self.get_logger().error(f'the last forces are held: {exc}')
         return JointState(name=desired.name, position=position.tolist(),

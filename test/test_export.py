@@ -26,12 +26,13 @@ from referees import (
     symmetric_parameters)
 from snapshot import Snapshot
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.core.binding import CONSTANTS, function, record
-from stewart_dynamics.errors import StewartError
+from stewart_dynamics.core.binding import CONSTANTS, function, places, record
+from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.export import main
 from stewart_dynamics.export.c_project import (
     c_project, check_name, digest, source, SOURCES)
-from stewart_dynamics.export.golden_vectors import WHOLE
+from stewart_dynamics.export.golden_vectors import whole_columns
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
 from stewart_dynamics.mechanics.frames.motion import ORTHOGONALITY
@@ -54,6 +55,7 @@ PROGRAM = 'stewart_export'
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / 'stewart_dynamics' / 'core'
 PLATFORM_FILE = ROOT / 'config' / 'platform.yaml'
+CRANK_FILE = ROOT / 'config' / 'crank_platform.yaml'
 # cc is mostly another name of one of the others.
 COMPILERS = list({Path(found).resolve(): name for name in ('cc', 'clang', 'gcc')
                   if (found := shutil.which(name))}.values())
@@ -368,17 +370,181 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope='module')
+def exported_cranks(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the files of the example with cranks, which have motors."""
+    folder = tmp_path_factory.mktemp('exported_cranks')
+    p = Parameters.from_yaml(CRANK_FILE).replaced({
+        'drive.gear_ratio': 40.0, 'drive.motor_inertia': 1e-4, 'actuator.reflected_inertia': None,
+        'drive.efficiency': 0.8, 'servo.angle_at_min': -1.2, 'servo.angle_at_max': 1.2})
+    for name, text in c_project(p, 'rig').items():
+        (folder / name).write_text(text)
+    return folder
+
+
 @needs_compiler
 @pytest.mark.parametrize('language', [['-std=c99'], ['-xc++', '-std=c++17']], ids=['C', 'C++'])
 @pytest.mark.parametrize('compiler', COMPILERS)
 def test_golden_vectors_are_met_and_nothing_warns(
-        exported: Path, tmp_path: Path, compiler: str, language: list[str]) -> None:
+        exported: Path, exported_cranks: Path, tmp_path: Path, compiler: str,
+        language: list[str]) -> None:
     if '-xc++' in language and not knows_cpp(compiler):
         pytest.skip(f'{compiler} compiles no C++')
-    made = compile_c(tmp_path, *language, '-O2', *WARNINGS, *exported.glob('*.c'), '-x', 'none',
-                     compiler=compiler)
+    for folder, text in (exported, 'hexapod: 40'), (exported_cranks, 'rig: 20'):
+        made = compile_c(tmp_path, *language, '-O2', *WARNINGS, *folder.glob('*.c'), '-x', 'none',
+                         compiler=compiler)
+        done = subprocess.run([made], capture_output=True, text=True)
+        assert (done.returncode, done.stdout) == (0, f'{text} golden vectors, 0 differences\n')
+
+
+@needs_compiler
+@pytest.mark.parametrize(('field', 'quantity'), [
+    ('actuator.reflected_inertia', 'demanded_torque'), ('legs.rod.length', 'lever'),
+    ('geometry.crank_directions', 'angle')])
+def test_golden_vectors_of_other_cranks_differ(
+        exported_cranks: Path, tmp_path: Path, field: str, quantity: str) -> None:
+    """Angles, levers and torques are compared, not only forces."""
+    shutil.copytree(exported_cranks, tmp_path / 'changed')
+    source = tmp_path / 'changed' / 'rig.c'
+    line = next(line for line in source.read_text().splitlines() if f'/* {field}: ' in line)
+    last = re.findall(r'-?0x[0-9a-fp.+-]+', line)[-2 if 'directions' in field else -1]
+    other = line.replace(last, (1.001 * float.fromhex(last)).hex())
+    source.write_text(source.read_text().replace(line, other, 1))
+    made = compile_c(tmp_path, '-std=c99', *source.parent.glob('*.c'))
     done = subprocess.run([made], capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (0, 'hexapod: 40 golden vectors, 0 differences\n')
+    assert done.returncode == 1
+    assert f': {quantity}[0] is ' in done.stdout
+
+
+def test_golden_vectors_of_cranks_are_read_as_they_were_computed(exported_cranks: Path) -> None:
+    with (exported_cranks / 'golden.csv').open() as file:
+        rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+    names = list(rows[0])
+    p = Parameters.from_yaml(CRANK_FILE).replaced({
+        'drive.gear_ratio': 40.0, 'drive.motor_inertia': 1e-4, 'actuator.reflected_inertia': None,
+        'drive.efficiency': 0.8})
+    platform = StewartPlatform(p)
+    for row in rows:
+        numbers = [row[name] for name in names]
+        base = None if not row['has_base'] else np.array(numbers[32:44])
+        result = platform.solve(np.array([numbers[2:26]]), np.array([numbers[26:32]]),
+                                None if base is None else base[None])[0]
+        for name in ('angle', 'speed', 'demanded_torque', 'lever'):
+            field = {'angle': 'angles', 'speed': 'speeds', 'demanded_torque': 'torques',
+                     'lever': 'levers'}[name]
+            assert [row[f'{name}_{leg}'] for leg in range(1, 7)] == (
+                result[places('stewart_result')[field]].tolist())
+        most = p['limits.torque_max']
+        assert [row[f'torque_{leg}'] for leg in range(1, 7)] == np.clip(
+            result[places('stewart_result')['torques']], -most, most).tolist()
+        assert row['motor_angle_1'] == 40.0 * row['angle_1']
+    assert {row['has_base'] for row in rows} == {0.0, 1.0}
+    assert any(row['exceeded_1'] for row in rows) and not rows[0]['exceeded_1']
+    assert {row['found_code'] for row in rows} == {OK}
+
+
+@pytest.mark.skipif('gcc' not in COMPILERS, reason='needs gcc')
+@pytest.mark.parametrize(('file', 'positions', 'efforts'), [
+    (PLATFORM_FILE, 6e-7, 2e-5), (CRANK_FILE, 4e-6, 1e-4)], ids=['lengths', 'angles'])
+def test_floats_in_place_of_doubles(
+        tmp_path: Path, file: Path, positions: float, efforts: float) -> None:
+    """As on processors whose doubles have 32 bits: errors of positions, efforts by the largest."""
+    p, count = Parameters.from_yaml(file), 5000
+    kind, platform, random = p.leg_kind, StewartPlatform(p), rng(8)
+    for name, text in c_project(p, 'rig').items():
+        if name != 'test_golden.c':
+            single = re.sub(r'\bdouble\b', 'float', text).replace('<math.h>', '<tgmath.h>')
+            (tmp_path / name).write_text(single)
+    (tmp_path / 'calls.c').write_text(
+        '#include "rig.h"\n#include <stddef.h>\n'
+        'int inverse(const stewart_motion * motion, stewart_result * result) {\n'
+        '  return stewart_inverse_dynamics(&rig, motion, NULL, NULL, result);\n}\n')
+    made = compile_c(tmp_path, '-std=c99', '-O2', '-fsingle-precision-constant', '-shared',
+                     '-fPIC', *tmp_path.glob('*.c'), compiler='gcc')
+    inverse = ctypes.CDLL(str(made)).inverse
+    home = platform.home_pose()
+    motions = np.zeros((count, MOTION))
+    motions[:, :3] = home.position + random.uniform(-0.08, 0.08, (count, 3))
+    motions[:, 3:12] = (from_euler(random.uniform(-0.15, 0.15, (count, 3)))
+                        @ home.rotation).reshape(count, 9)
+    motions[:, 12:] = random.normal(0.0, 1.0, (count, 12))
+    with np.errstate(all='ignore'):
+        expected = platform.solve(motions)
+    low, high = (p[name] for name in kind.position_limits)
+    at = expected[:, kind.position.columns]
+    usual = ((at > low) & (at < high)).all(axis=1)
+    if kind.width == RESULT:
+        levers = expected[:, places('stewart_result')['levers']] / p['legs.crank.length']
+        usual &= (np.abs(levers) > p['limits.lever_min']).all(axis=1)
+    found = np.zeros((count, RESULT), np.float32)
+    codes = [inverse(*(ctypes.c_void_p(row.ctypes.data) for row in rows))
+             for rows in zip(motions.astype(np.float32), found, strict=True)]
+    assert usual.sum() > 0.5 * count
+    assert not np.array(codes)[usual].any()
+    errors = np.abs(found[:, :kind.width] - expected)[usual]
+    largest = np.abs(expected[usual][:, kind.effort.columns]).max(axis=1)
+    of_efforts = errors[:, kind.effort.columns].max(axis=1) / largest
+    assert 0.1 * positions < errors[:, kind.position.columns].max() < positions
+    assert 0.1 * efforts < of_efforts.max() < efforts
+
+
+# Servos
+
+SERVOS: dict[str, Any] = {
+    'servo.pulse_min': [0.0005, 0.0006, 0.0005, 0.0009, 0.001, 0.0005],
+    'servo.pulse_max': [0.0025, 0.0024, 0.0025, 0.0021, 0.002, 0.0025],
+    'servo.angle_at_min': [-1.1, 1.2, -1.3, 0.9, -0.8, 1.1],
+    'servo.angle_at_max': [1.3, -1.1, 1.2, -1.1, 0.9, -1.2]}
+
+
+def servo_rig(**changes: Any) -> StewartPlatform:
+    return StewartPlatform(Parameters.from_yaml(CRANK_FILE).replaced({**SERVOS, **changes}))
+
+
+def test_servo_pulses_are_on_the_line_through_two_points_and_never_outside() -> None:
+    rig, random = servo_rig(), rng(5)
+    low, high = (np.array(SERVOS[f'servo.pulse_{end}']) for end in ('min', 'max'))
+    first, last = (np.array(SERVOS[f'servo.angle_at_{end}']) for end in ('min', 'max'))
+    part = random.uniform(0.0, 1.0, (500, 2, 6))
+    found = rig.servo_pulses(first + part * (last - first))
+    np.testing.assert_allclose(found, low + part * (high - low), rtol=0.0, atol=1e-17)
+    for ends, pulses in (first, low), (last, high):
+        np.testing.assert_allclose(rig.servo_pulses(ends), pulses, rtol=0.0, atol=1e-18)
+        past = ends + 1e-12 * np.sign(ends)  # rounding: at the end, never outside
+        assert rig.servo_pulses(past).tolist() == pulses.tolist()
+    home = rig.inverse_kinematics(rig.home_pose())
+    np.testing.assert_allclose(
+        rig.servo_pulses(home), low + (high - low) * (0.0 - first) / (last - first), rtol=1e-12)
+
+
+def test_servos_out_of_range_or_not_measured_get_no_pulses(snapshot: Snapshot) -> None:
+    rig = servo_rig()
+    with snapshot.raises(MotionError):
+        rig.servo_pulses([[0.0] * 6, [0.0, 0.0, 0.0, 0.91, 0.0, 0.0]])
+    with snapshot.raises(MotionError):
+        rig.servo_pulses([0.0, 0.0, 0.0, 0.0, -0.81, math.nan])
+    for path in CRANK_FILE, PLATFORM_FILE:
+        with snapshot.raises(ParameterError):
+            StewartPlatform(Parameters.from_yaml(path)).servo_pulses([0.0] * 6)
+    call, pulses = function('stewart_servo_pulses'), np.full(6, -1.0)
+    hexapod = rig.structure
+    for angles, code in (([0.0] * 5 + [1.11], 13), ([0.0] * 5 + [math.nan], 2)):
+        assert call(hexapod, np.array(angles), pulses) == code
+        assert pulses.tolist() == [-1.0] * 6
+
+
+@pytest.mark.parametrize('changes', [
+    {'servo.angle_at_min': None}, {'servo.angle_at_min': 1.0, 'servo.angle_at_max': 1.0},
+    {'servo.pulse_min': 0.0015, 'servo.pulse_max': [0.002, 0.002, 0.0015, 0.002, 0.002, 0.002]},
+    {'servo.pulse_max': 2500.0}, {'servo.angle_at_max': 60.0}])
+def test_points_of_servos_that_cannot_be(changes: dict[str, Any], snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
+        servo_rig(**changes)
+
+
+def test_servos_belong_to_drives_that_turn(snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
+        Parameters.from_yaml(PLATFORM_FILE).replaced(SERVOS)
 
 
 @needs_compiler
@@ -397,7 +563,7 @@ def test_golden_vectors_are_not_met_by_another_hexapod(exported: Path, tmp_path:
 
 @needs_compiler
 def test_golden_vectors_and_bad_inputs_are_clean_under_sanitizers(
-        exported: Path, tmp_path: Path) -> None:
+        exported: Path, exported_cranks: Path, tmp_path: Path) -> None:
     options: list[str | Path] = [
         '-std=c99', '-g', '-fsanitize=address,undefined', '-fno-sanitize-recover=all',
         f'-I{exported}', exported / 'hexapod.c', exported / 'stewart_dynamics.c']
@@ -406,9 +572,10 @@ def test_golden_vectors_and_bad_inputs_are_clean_under_sanitizers(
         input='int main(void) {return 0;}', text=True, capture_output=True)
     if probe.returncode:
         pytest.skip('the compiler has no sanitizers')
-    for program in exported / 'test_golden.c', ROOT / 'test' / 'export_bad_inputs.c':
-        done = subprocess.run([compile_c(tmp_path, *options, program)], capture_output=True,
-                              text=True)
+    of_cranks = [*options[:4], *exported_cranks.glob('*.c')]
+    for given in ([*options, exported / 'test_golden.c'], of_cranks,
+                  [*options, ROOT / 'test' / 'export_bad_inputs.c']):
+        done = subprocess.run([compile_c(tmp_path, *given)], capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -523,7 +690,7 @@ def test_golden_csv_is_read_as_it_was_computed(exported: Path) -> None:
     """Inputs read from it give the library the results in it."""
     with (exported / 'golden.csv').open() as file:
         texts = list(csv.DictReader(file))
-    assert all(row[name].isdecimal() for row in texts for name in WHOLE)
+    assert all(row[name].isdecimal() for row in texts for name in whole_columns(TELESCOPIC))
     rows = [{name: float(text) for name, text in row.items()} for row in texts]
     names = list(rows[0])
     step, state = Step(Parameters.from_yaml(PLATFORM_FILE)), FIRST

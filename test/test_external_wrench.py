@@ -433,11 +433,11 @@ def controlled(rate: float) -> tuple[Array, float]:
     found, off = np.full((len(seconds), 6), np.nan), 0.0
     for n, now in enumerate(seconds.tolist()):
         state = plant.state
-        command = (wanted.forces[n] + 61.0 * 900.0 * (wanted.lengths[n] - state.lengths)
+        command = (wanted.forces[n] + 61.0 * 900.0 * (wanted.lengths[n] - state.positions)
                    + 61.0 * 42.0 * (wanted.rates[n] - state.rates))
         state = plant.advance(six(command), LOAD if 1.0 <= now < 3.0 else NO_WRENCH)
-        last = step(Measurement(BEGIN + round((n + 1) * 1e9 / rate), state.lengths, state.rates,
-                                state.forces), last, NO_WRENCH, None)
+        last = step(Measurement(BEGIN + round((n + 1) * 1e9 / rate), state.positions, state.rates,
+                                state.efforts), last, NO_WRENCH, None)
         if last.wrench is not None:
             found[n] = last.wrench
         off = max(off, math.dist(last.motion[:3], state.pose[:3]))

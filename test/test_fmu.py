@@ -24,8 +24,10 @@ from snapshot import Snapshot
 from stewart_dynamics import (
     InverseDynamics, Motion, ParameterError, Parameters, StewartPlatform)
 from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.core.binding import places
 from stewart_dynamics.export import main
 from stewart_dynamics.export.fmu import find_compiler, fmu, variables
+from stewart_dynamics.export.golden_vectors import golden_vectors
 from stewart_dynamics.mechanics.frames.rotation import (
     from_quaternion, quaternion_length, to_quaternion)
 from stewart_dynamics.setpoints.joining import Setpoints
@@ -46,6 +48,7 @@ LENGTHS = [REFERENCES[f'lengths[{leg}]'] for leg in range(1, 7)]
 STATUS = [REFERENCES['status']]
 HOME = [each.start for each in VARIABLES[:47]]
 NOT_FINITE, NOT_UNIT, OUT_OF_RANGE, SINGULAR, SUPPRESSED, BROKEN_RULE = 2, 4, 5, 6, 7, 10
+UNREACHABLE = 11
 
 
 class Unit:
@@ -532,3 +535,51 @@ def test_the_example_in_fmpy_has_the_forces_of_the_library(path: Path) -> None:
     expected = StewartPlatform(laden).inverse_dynamics(motion).forces
     assert [found[f'forces[{leg}]'][-1] for leg in range(1, 7)] == pytest.approx(
         expected.tolist(), rel=1e-9)
+
+
+@pytest.mark.parametrize('drives', [{}, {
+    'drive.gear_ratio': 40.0, 'drive.motor_inertia': 1e-4, 'actuator.reflected_inertia': None}],
+    ids=['bare', 'with motors'])
+def test_cranks_have_angles_torques_and_levers(
+        version: str, drives: dict[str, Any], tmp_path: Path) -> None:
+    """A motion from home until the legs do not reach: the bits of the library, by their names."""
+    parameters = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml').replaced(drives)
+    path, platform = tmp_path / 'rig.fmu', StewartPlatform(parameters)
+    path.write_bytes(fmu(parameters, 'rig', version, COMPILER))
+    assert not validate_fmu(str(path))
+    described = fmpy.read_model_description(str(path))
+    references = {each.name: int(each.valueReference) for each in described.modelVariables}
+    of_legs = {name: [references[f'{name}[{leg}]'] for leg in range(1, 7)]
+               for name in ('angles', 'speeds', 'torques', 'levers', 'joint_forces')}
+    assert not {'lengths[1]', 'rates[1]', 'forces[1]'} & set(references)
+    assert ('motor_torques[1]' in references) == bool(drives)
+    for name, unit in ('angles', 'rad'), ('speeds', 'rad/s'), ('torques', 'N.m'), ('levers', 'm'):
+        assert {each.unit for each in described.modelVariables
+                if each.name.startswith(f'{name}[')} == {unit}
+    unit_ = Unit(path, version, tmp_path / 'one')
+    unit_.fmu.exitInitializationMode()
+    most = parameters['limits.torque_max']
+    for row in golden_vectors(parameters):
+        motion, wrench = row[2:26].copy(), row[26:32]
+        quaternion = np.array(to_quaternion(motion[3:12].reshape(3, 3)))
+        motion[3:12] = from_quaternion(*(quaternion / quaternion_length(*quaternion)))
+        unit_.put(0, [*motion[:3], *quaternion, *motion[12:], *wrench])
+        unit_.step()
+        result = platform.solve(motion[None], wrench[None])[0]
+        assert unit_.status == 0
+        for name in ('angles', 'speeds', 'levers', 'joint_forces'):
+            assert unit_.get(of_legs[name]) == result[places('stewart_result')[name]].tolist()
+        assert unit_.get(of_legs['torques']) == np.clip(
+            result[places('stewart_result')['torques']], -most, most).tolist()
+        if drives:
+            at = references['motor_speeds[1]']
+            assert unit_.get([at]) == [40.0 * unit_.get(of_legs['speeds'])[0]]
+        else:
+            with pytest.raises(fmpy.fmi1.FMICallException):
+                unit_.get([104])
+    angles = unit_.get(of_legs['angles'])
+    unit_.put(0, [0.0, 0.0, 3.0])
+    unit_.step()
+    assert unit_.status == UNREACHABLE
+    assert unit_.get(of_legs['torques']) == [0.0] * 6 and unit_.get(of_legs['angles']) == angles
+    unit_.close()

@@ -454,8 +454,8 @@ def test_exact_recordings_of_the_simulator_have_intervals(seed: int) -> None:
     found = []
     for lengths, rates, forces in zip(desired.lengths, desired.rates, desired.forces, strict=True):
         state = plant.state
-        found.append((state.lengths, state.rates, state.forces))
-        plant.advance(tuple((forces + 4e5 * (lengths - state.lengths) + 1.6e4 * (
+        found.append((state.positions, state.rates, state.efforts))
+        plant.advance(tuple((forces + 4e5 * (lengths - state.positions) + 1.6e4 * (
             rates - state.rates)).tolist()), NO_WRENCH)
     lengths, rates, forces = np.array(found).swapaxes(0, 1)
     bag = Recorded(np.zeros(0), lengths - GIVEN['geometry.zero_length'], rates, forces)

@@ -31,12 +31,18 @@ from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
+from stewart_dynamics.legs import CRANK
+from stewart_dynamics.mechanics.limits import Limits, result_values
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import read_yaml
+from stewart_dynamics.reference_motion.motion_functions import motion_at
+from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.simulator.plant import Plant
 from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 
 SECONDS = 0.5
 MOTION = ROOT / 'config' / 'trajectory_loop.yaml'
+CRANKS = ROOT / 'config' / 'crank_platform.yaml'
 CONTROLLER = ROOT / 'examples' / 'leg_controller.py'
 
 
@@ -51,11 +57,12 @@ def demo() -> ModuleType:
 @pytest.fixture(scope='module')
 def run(ros_environment: None, demo: ModuleType) -> Iterator[Callable[..., Any]]:
     """Return a function that runs the loop in a domain of its own, once for each number."""
-    loop = demo.Loop(PLATFORM, MOTION, SECONDS, 8.0)
+    loops = {kind: demo.Loop(*(ROOT / 'config' / file for file in files), SECONDS, 8.0)
+             for kind, files in demo.FILES.items()}
     with pytest.MonkeyPatch.context() as patch, own_domain() as domain:
         patch.setenv('ROS_DOMAIN_ID', str(domain))
         rclpy.init()
-        yield cache(lambda feed_forward, payload, number=0: loop.run(
+        yield cache(lambda feed_forward, payload, number=0, kind='telescopic': loops[kind].run(
             feed_forward, payload, lambda many: None))
         rclpy.try_shutdown()
 
@@ -70,6 +77,49 @@ def test_feed_forward_cuts_the_tracking_error(
         assert 0.0 < times * error < alone.errors.rms[name], name
     # PD alone carries the weight by its error: it lacks the node's force, with more payload more.
     assert 100.0 < alone.errors.rms['all legs'] < 10e3  # [um]
+
+
+@pytest.mark.slow
+def test_torques_of_the_node_cut_the_tracking_error_of_cranks(
+        demo: ModuleType, run: Callable[..., Any]) -> None:
+    """By more than a factor of 100; with 30 % more payload than the node knows, of 3."""
+    alone, forward, heavier = (run(feed, payload, kind='crank') for feed, payload in (
+        (False, 1.0), (True, 1.0), (True, 1.3)))
+    assert len(forward.errors.seconds) == 501
+    for name, error in forward.errors.rms.items():
+        assert 0.0 < 100.0 * error < alone.errors.rms[name], name
+        assert 3.0 * heavier.errors.rms[name] < alone.errors.rms[name], name
+    assert 1e3 < alone.errors.rms['all legs'] < 10e3  # [urad]
+    line = demo.last_line([alone, forward], CRANK)
+    assert re.fullmatch(r'RMS error of the leg angles: \d+\.\d urad by PD alone, \d+\.\d urad '
+                        'with the torques of the node', line)
+    table = demo.table([alone, forward], ['as in the parameters'], CRANK)
+    assert 'PD + torques' in table
+    assert re.search('leg 1 +urad', table)
+
+
+def test_the_motion_of_the_demo_keeps_the_limits_of_the_rig(demo: ModuleType) -> None:
+    """With the heavier payload, too: angles, speeds, torques, rod forces, levers."""
+    hexapod, motion = (ROOT / 'config' / name for name in demo.FILES['crank'])
+    settings = ReferenceMotionParameters.from_yaml(motion)
+    given = Parameters.from_yaml(hexapod)
+    platform = StewartPlatform(given.replaced({
+        'platform.mass': demo.HEAVIER * given.platform.mass,
+        'platform.inertia': demo.HEAVIER * given.platform.inertia}))
+    times = np.arange(0.0, 10.0, 2e-3)
+    result = platform.inverse_dynamics(motion_at(settings, times))
+    limits = Limits(platform.parameters)
+    values = {**result_values(given, result.rows), 'limits.lever_min': np.abs(
+        result.levers) / given['legs.crank.length']}
+    assert set(values) >= {'limits.angle_min', 'limits.angle_max', 'limits.speed_max',
+                           'limits.torque_max', 'limits.rod_force_max'}
+    for name, each in values.items():
+        assert not limits.exceeds(name, each).any(), name
+    assert np.abs(result.speeds).max() > 0.45 * given.limits.speed_max.max()  # not for nothing
+    home = platform.home_pose()
+    ends = motion_at(settings, np.array([0.0, 10.0]))
+    assert np.allclose(ends.position, home.position, rtol=0.0, atol=1e-6)
+    assert np.abs(ends.linear_velocity).max() < 1e-9
 
 
 def test_the_table_has_a_space_between_large_numbers(demo: ModuleType) -> None:
@@ -140,13 +190,14 @@ def test_a_run_with_bad_options_is_rejected_in_one_line(
     snapshot(line)
 
 
-def controlled(peer: Peer, folder: Path, timeout: float,
+def controlled(peer: Peer, folder: Path, timeout: float, platform: Path = PLATFORM,
                ) -> tuple[Program, list[bytes], Publisher, Publisher]:
     """Start the controller; return its commands, and publishers of measured and desired legs."""
     peer.watched = Program(
         [sys.executable, CONTROLLER, '--ros-args', '-p', f'timeout:={timeout}', '-p',
-         f'params_file:={PLATFORM}', '-p', 'proportional_gain:=4e5', '-p',
-         'derivative_gain:=1.6e4'], peer.domain, folder)
+         f'params_file:={platform}', *(() if platform != PLATFORM else (
+             '-p', 'proportional_gain:=4e5', '-p', 'derivative_gain:=1.6e4'))],
+        peer.domain, folder)
     return (peer.watched, peer.listen('/stewart_simulator/commands', Float64MultiArray),
             peer.writer('/stewart_simulator/leg_states', JointState),
             peer.writer('/stewart_dynamics/leg_states', JointState))
@@ -159,7 +210,7 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
         **read_yaml(PLATFORM, 'stewart_simulator'),
         **read_yaml(ROOT / 'config' / 'simulator.yaml', 'stewart_simulator')}))
     joints, zero = plant.parameters['joints'], plant.parameters['geometry.zero_length']
-    start = np.array(plant.state.lengths) - zero
+    start = np.array(plant.state.positions) - zero
     moving = JointState(name=joints, position=start + 5e-3, velocity=[0.01] * 6,
                         effort=np.arange(6.0))
     # The forces at rest carry the weight.
@@ -172,13 +223,13 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
     def commanded(target: JointState) -> Any:
         """Return the command to the present state once it is the one for a desired state."""
         state = plant.state
-        expected = (4e5 * (np.subtract(target.position, state.lengths) + zero)
+        expected = (4e5 * (np.subtract(target.position, state.positions) + zero)
                     + 1.6e4 * np.subtract(target.velocity, state.rates) + target.effort)
 
         def came() -> bool:
             if target is moving:
                 desired.publish(moving)
-            measured.publish(JointState(name=joints, position=np.subtract(state.lengths, zero),
+            measured.publish(JointState(name=joints, position=np.subtract(state.positions, zero),
                                         velocity=state.rates))
             count = len(commands)
             peer.spin()
@@ -197,7 +248,7 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
             plant.advance(command, NO_WRENCH)
         assert 'the last position is held' in program.stderr
         # Friction may stop it at a distance of friction / gain.
-        assert np.abs(plant.state.lengths - zero - moving.position).max() < 5e-4
+        assert np.abs(plant.state.positions - zero - moving.position).max() < 5e-4
         assert np.abs(plant.state.rates).max() < 1e-3
         assert command == pytest.approx(weight, abs=200.0)
         commanded(moving)
@@ -246,6 +297,38 @@ def test_after_a_gap_the_controller_returns_slowly_and_within_the_limits_of_forc
             assert max(np.abs(deserialize_message(each, Float64MultiArray).data).max()
                        for each in commands) <= limit
             until_commanded(0.3, 300.0, 1e-6)
+    finally:
+        program.kill()
+
+
+def test_the_controller_holds_cranks_by_their_torques_at_rest(peer: Peer, tmp_path: Path) -> None:
+    """Desired states have stopped; commands are at most limits.torque_max."""
+    platform = StewartPlatform.from_yaml(CRANKS)
+    position = platform.inverse_kinematics(platform.home_pose()) + 0.1
+    pose = platform.forward_kinematics(position, platform.home_pose())
+    torques = platform.inverse_dynamics(Motion.from_pose(pose)).torques
+    program, commands, measured, desired = controlled(peer, tmp_path, 0.5, CRANKS)
+
+    def until_commanded(offset: float, expected: Any, follow: bool) -> None:
+        def came() -> bool:
+            if follow:
+                desired.publish(JointState(
+                    name=platform.parameters.joints, position=position, velocity=[0.0] * 6,
+                    effort=[7.0] * 6))
+            measured.publish(JointState(
+                name=platform.parameters.joints, position=position - offset, velocity=[0.0] * 6))
+            peer.spin(0.02)
+            return bool(commands) and np.allclose(
+                deserialize_message(commands[-1], Float64MultiArray).data, expected, rtol=1e-9)
+
+        peer.until(came, f'{expected} N m')
+
+    try:
+        until_commanded(0.0, 7.0, follow=True)
+        until_commanded(0.0, torques, follow=False)
+        assert 'the last position is held' in program.stderr
+        until_commanded(0.5, 250.0, follow=False)
+        assert program.stop() == 0, program.stderr
     finally:
         program.kill()
 

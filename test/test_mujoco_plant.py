@@ -36,7 +36,7 @@ def parameters():
 
 def test_both_begin_in_the_same_state(parameters):
     ours, theirs = Plant(parameters).state, MuJoCoPlant(parameters).state
-    for name in ('lengths', 'rates', 'pose', 'twist', 'acceleration', 'forces'):
+    for name in ('positions', 'rates', 'pose', 'twist', 'acceleration', 'efforts'):
         assert getattr(theirs, name) == pytest.approx(getattr(ours, name), abs=1e-12), name
 
 
@@ -49,13 +49,13 @@ def test_both_move_alike_under_the_same_forces(parameters):
         forces = tuple((hold + 100.0 * np.sin(0.05 * n + np.arange(6.0))).tolist())
         for plant in (ours, theirs):
             plant.advance(forces, (0.0,) * 6)
-    moved = np.array(ours.state.lengths) - platform.inverse_kinematics(begin)
+    moved = np.array(ours.state.positions) - platform.inverse_kinematics(begin)
     assert np.abs(moved).max() > 5e-3
-    assert theirs.state.lengths == pytest.approx(ours.state.lengths, abs=1e-4)
+    assert theirs.state.positions == pytest.approx(ours.state.positions, abs=1e-4)
     assert theirs.state.rates == pytest.approx(ours.state.rates, abs=1e-3)
     assert theirs.state.pose == pytest.approx(ours.state.pose, abs=2e-4)
     assert theirs.state.twist == pytest.approx(ours.state.twist, abs=3e-3)
-    assert theirs.state.forces == pytest.approx(ours.state.forces)
+    assert theirs.state.efforts == pytest.approx(ours.state.efforts)
 
 
 def test_brakes_take_all_speed(parameters):

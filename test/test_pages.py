@@ -49,8 +49,9 @@ def tables(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 def test_generated_tables_are_current(tables: ModuleType) -> None:
     pages = tables.pages()
     assert {path.relative_to(ROOT).as_posix() for path in pages} == {
-        'benchmarks/README.md', 'docs/faults.md', 'docs/identify_from_bags.md', 'docs/node.md',
-        'docs/motion_cueing.md', 'docs/parameters.md', 'docs/simulator.md', 'security/policy.xml'}
+        'benchmarks/README.md', 'docs/cranks.md', 'docs/faults.md', 'docs/identify_from_bags.md',
+        'docs/node.md', 'docs/motion_cueing.md', 'docs/parameters.md', 'docs/simulator.md',
+        'security/policy.xml'}
     for path, own in pages.items():
         text = path.read_text(encoding='utf-8')
         assert tables.generated(text, own) == text, 'run: python docs/figures/tables.py'

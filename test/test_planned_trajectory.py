@@ -380,7 +380,7 @@ def test_a_limit_of_length_one_rounding_inside_the_pose_is_not_exceeded(
                 with snapshot.raises(ParameterError):
                     Plant(simulated_parameters)
             else:
-                assert Plant(simulated_parameters).state.lengths == tuple(lengths.tolist())
+                assert Plant(simulated_parameters).state.positions == tuple(lengths.tolist())
 
 
 def test_a_singularity_is_reported_before_exceeded_limits() -> None:

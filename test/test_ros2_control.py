@@ -17,15 +17,17 @@ import sys
 from typing import Any
 from xml.etree import ElementTree as ET
 
+from crank_machines import random_machine, random_state
+from crank_platforms import motion_of, parameters_of
 from governed import limited_hexapod
 import numpy as np
 import pytest
-from referees import random_motion, random_wrench, rng
-from stewart_dynamics import Parameters
+from referees import Array, random_motion, random_wrench, rng
+from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.core.binding import record
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
-from stewart_dynamics.legs import TELESCOPIC
+from stewart_dynamics.legs import CRANK, TELESCOPIC
 from stewart_dynamics.mechanics.limits import LIMITS
 from stewart_dynamics.parameters.table import UNIVERSAL
 from stewart_dynamics.setpoints.step import Batch, Step
@@ -262,6 +264,100 @@ def test_circles_and_axes_of_the_home_pose_have_the_bits_of_the_node(program: Pa
         assert exceeded & LIMITS[name].bit
 
 
+def assert_crank_steps(program: Path, p: Parameters, motions: Array, wrenches: Array) -> Any:
+    """Compare all numbers of steps with the node's; return the records."""
+    stamps = np.cumsum(np.full(len(motions), 300_000_000))
+    rows = [f'{stamp}\n' + '\n'.join(map(float.hex, (*motion, *wrench)))
+            for stamp, motion, wrench in zip(
+                stamps.tolist(), motions.tolist(), wrenches.tolist(), strict=True)]
+    done = subprocess.run(
+        [program], input='\n'.join([as_text(p) + str(len(rows)), *rows]).encode(),
+        capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b'')
+    found = np.frombuffer(done.stdout, record('stewart_output'))
+    outputs = Step(p)(Batch.of(stamps, motions, wrenches))
+    expected = outputs.records.copy()
+    for name in OUTPUT_FIELDS:
+        assert found[name].tobytes() == expected[name].tobytes(), name
+    return found
+
+
+def test_steps_of_cranks_have_the_bits_of_the_node(program: Path) -> None:
+    """Angles, speeds, torques, levers, limits, motors; full tensors, tilted axes, branches."""
+    seen: set[int | str] = set()
+    of_cranks = {limit.bit for limit in LIMITS.values() if limit.name.startswith(CRANK.own)}
+    for seed in range(30):
+        random = rng(seed)
+        machine, count = random_machine(random), 20
+        drives = {'drive.gear_ratio': random.uniform(5.0, 50.0, 6), 'drive.efficiency': 0.8,
+                  'actuator.reflected_inertia': None, 'drive.motor_inertia': 1e-4,
+                  'drive.torque_max': random.uniform(0.01, 100.0, 6)} if seed % 2 else {}
+        p = parameters_of(machine, **{
+            'setpoint.sync_tolerance': 0.0, 'limits.speed_max': random.uniform(1.0, 20.0, 6),
+            'limits.torque_max': 10.0 ** random.uniform(0.0, 4.0, 6),
+            'limits.rod_force_max': 10.0 ** random.uniform(1.0, 5.0, 6),
+            'limits.lever_min': random.uniform(0.0, 0.5, 6),
+            'limits.angle_min': machine.middle - random.uniform(0.2, 3.0, 6),
+            'limits.angle_max': machine.middle + random.uniform(0.2, 3.0, 6)})
+        p = p.replaced(drives)
+        states = [random_state(machine, random, False) for _ in range(count)]
+        found = assert_crank_steps(
+            program, p, np.stack([motion_of(state).rows for state in states]),
+            np.stack([state.wrench for state in states]))
+        seen |= {bits for bits in of_cranks if (found['exceeded'] & bits).any()}
+        if np.isfinite(found['motors']['commands']).all():
+            seen.add('motors')
+    assert seen == {*of_cranks, 'motors'}
+
+
+def test_headings_and_branches_of_home_have_the_bits_of_the_node(program: Path) -> None:
+    """The example, mirrored, hanging and turned: axes and branches follow from headings."""
+    example, random, branches = Parameters.from_yaml(
+        ROOT / 'config' / 'crank_platform.yaml'), rng(9), set()
+    for n in range(8):
+        p = example.replaced({
+            'setpoint.sync_tolerance': 0.0,
+            'geometry.crank_angles': example.geometry.crank_angles + (math.pi if n % 2 else 0.0),
+            'geometry.platform_side': 'negative' if n >= 4 else 'auto',
+            'legs.rod.length': random.uniform(0.7, 0.75), 'singularity.action': 'warn'})
+        home = StewartPlatform(p).home_pose()
+        motions = np.zeros((5, 24))
+        motions[:, :3] = home.position + random.uniform(-0.02, 0.02, (5, 3))
+        motions[:, 3:12] = home.rotation.ravel()
+        motions[:, 12:] = random.normal(0.0, 0.5, (5, 12))
+        found = assert_crank_steps(program, p, motions, random.normal(0.0, 100.0, (5, 6)))
+        branches.add(tuple(np.sign(found['result']['levers'][0])))
+    assert len(branches) > 1
+
+
+@pytest.mark.parametrize(('changes', 'message'), [
+    ({'legs.rod.length': []}, 'legs.rod.length: not set: needed by legs.crank.length'),
+    ({'geometry.crank_angles': []}, 'geometry.crank_angles: not set: needed by '
+     'legs.crank.length; or give geometry.crank_axes and geometry.crank_directions'),
+    ({'geometry.crank_axes': [1.0, 0.0, 0.0] * 6}, 'geometry.crank_axes, '
+     'geometry.crank_directions: given as well as geometry.crank_angles: leave out one of them'),
+    ({'legs.crank.length': [0.2, 0.2]}, 'legs.crank.length: must have 1 or 6 entries, has 2'),
+    ({'legs.rod.length': [0.1]}, "home pose: no level pose has all rods at the cranks' middle "
+     'angles: needed by geometry.crank_branch: auto'),
+    ({'limits.angle_min': [-4.0], 'limits.angle_max': [4.0]}, 'geometry.crank_branch: auto: both '
+     'are possible: give the branch, or limits of the angle: leg 1'),
+    ({'geometry.crank_branch': ['positive', 'auto']},
+     'geometry.crank_branch: must have 1 or 6 entries'),
+    ({'limits.length_max': [1.0]},
+     'limits.length_max: must not be given with legs.crank.length'),
+    ({'limits.lever_min': [1.0]}, 'limits.lever_min: must be less than 1: leg or plate 1'),
+    ({'geometry.crank_angles': [], 'geometry.crank_axes': [1.0, 0.0, 0.0] * 6,
+      'geometry.crank_directions': [1.0, 1.0, 0.0] * 6, 'geometry.crank_branch': ['positive']},
+     'geometry.crank_directions: must be perpendicular to geometry.crank_axes, to 0.001 rad: leg '
+     'or plate 1')])
+def test_rules_of_cranks_in_one_line(
+        program: Path, changes: dict[str, Any], message: str) -> None:
+    p = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
+    done = subprocess.run([program], input=as_text(p, changes) + '0', capture_output=True,
+                          text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (1, '', f'{message}\n')
+
+
 @pytest.mark.parametrize(('changes', 'message'), [
     ({'limits.length_min': [1.0, 2.0]}, 'limits.length_min: must have 1 or 6 entries, has 2'),
     ({'legs.piston.mass': [math.inf]}, 'legs.piston.mass: must be finite'),
@@ -301,7 +397,9 @@ def test_circles_and_axes_of_the_home_pose_have_the_bits_of_the_node(program: Pa
     ({'command_interfaces': ['torque_per_mille'], 'actuator.screw_lead': [0.01]},
      'drive.rated_torque: not set: needed by torque_per_mille in command_interfaces'),
     ({'legs.crank.length': [0.2]},
-     'legs.crank.length: stewart_dynamics_controller takes telescopic legs alone'),
+     'legs.cylinder.mass: must not be given with legs.crank.length'),
+    ({'limits.angle_max': [0.5]},
+     'limits.angle_max: needs legs.crank.length, which is not set'),
     ({'payload.mass': 3.0, 'payload.inertia': [-1.0, 0.0, 0.0, 1.0, 0.0, 1.0]},
      'payload: must be finite, its inertia positive semidefinite')])
 def test_rules_in_one_line(program: Path, changes: dict[str, Any], message: str) -> None:

@@ -40,6 +40,8 @@ from trajectories import FREE
 
 SIMULATOR = '/stewart_simulator'
 FILE = ROOT / 'config' / 'simulator.yaml'
+CRANKS = ROOT / 'config' / 'crank_platform.yaml'
+CRANKS_HOME = [0.0, 0.0, 0.65, 0.0, 0.0, 0.0]
 STEPPED = 'use_sim_time:=true'
 FIRST = 1_000_000_000  # where simulated time begins [ns]
 PERIOD = 2_000_000  # [ns]
@@ -267,6 +269,31 @@ def test_each_command_is_one_period_and_nothing_else_advances_time(begin: Start)
     assert simulator.step([500.0] * 6) == end + PERIOD
 
 
+def test_torques_of_shafts_move_a_hexapod_with_cranks(begin: Start) -> None:
+    """Its topics have angles, rates and torques; to the bit those of the plant in this process."""
+    home = CRANKS_HOME
+    simulator = begin(STEPPED, f'initial_pose:={home}', 'noise.angle:=1.0e-4',
+                      files=(CRANKS, FILE))
+    parameters = SimulatorParameters({
+        **read_yaml(CRANKS, 'stewart_simulator'), **read_yaml(FILE, 'stewart_simulator'),
+        'initial_pose': home, 'noise.angle': 1e-4})
+    plant, messages = Plant(parameters), StateMessages(parameters)
+    for _ in range(len(set(simulator.raw['leg_states']))):
+        plant.measured()
+    commands = 50.0 + rng().uniform(-30.0, 30.0, (20, 6))
+    commands[-1] = 1000.0  # saturates
+    for command in commands.tolist():
+        stamp = simulator.step(command)
+        plant.advance(tuple(command), NO_LOAD)
+        for topic, data in messages.write(stamp, plant.measured()):
+            assert simulator.raw[topic][-1] == data
+    assert list(simulator.last().effort) == [250.0] * 6
+    angles = StewartPlatform(parameters).inverse_kinematics(Pose(home[:3], np.eye(3)))
+    assert np.abs(np.subtract(simulator.states()[0].position, angles)).max() < 1e-3
+    simulator.until_said('WARN', 'commands: leg_1: 1000 N m exceeds limits.torque_max, clipped to '
+                         '250 N m')
+
+
 # In real time
 
 def test_in_real_time_the_brakes_hold_it_until_the_first_command(begin: Start) -> None:
@@ -376,6 +403,24 @@ def test_the_hexapod_rests_if_a_step_cannot_be_computed(begin: Start, tmp_path: 
     assert simulator.said('ERROR', '') == simulator.said('ERROR', 'held at rest permanently')
 
 
+def test_a_motion_past_the_dead_centre_is_refused(begin: Start) -> None:
+    """A load of 10 MN; one of 1 MN is held by the end stops."""
+    simulator = begin(STEPPED, f'initial_pose:={CRANKS_HOME}', files=(CRANKS, FILE))
+    simulator.load((0.0, 0.0, 1e7, 0.0, 0.0, 0.0))
+    # Wrenches and commands come in any order: a rejected one shows that the first has come.
+    simulator.load((1.0,) * 6, frame='elsewhere')
+    simulator.until_said('WARN', 'wrench rejected: wrong frame_id')
+    for _ in range(50):
+        simulator.step(NO_LOAD)
+    assert 'as at a dead centre; smallest lever: leg_' in simulator.until_said(
+        'ERROR', 'held at rest permanently')
+    assert not np.any([*simulator.last().velocity, *simulator.last().effort])
+    assert np.abs(simulator.last().position).max() < math.pi / 2
+    position = simulator.last().position
+    simulator.step([100.0] * 6)
+    assert simulator.last().position == position
+
+
 TOO_STIFF = 'actuator.coulomb_friction:=4000.0', 'actuator.reflected_mass:=0.0'
 
 
@@ -415,6 +460,14 @@ def test_unsupported_parameters_are_reported_in_one_line(domain: int, start: Sta
     line, = (line for line in program.stderr.splitlines() if not line.startswith('[WARN]'))
     assert line.startswith('stewart_simulator: ')
     assert 'leg_1: length 1.6' in line
+
+
+def test_an_initial_pose_out_of_reach_is_reported_in_one_line(domain: int, tmp_path: Path) -> None:
+    with closing(Simulator(domain, tmp_path, 'initial_pose:=[0.0, 0.0, 0.9, 0.0, 0.0, 0.0]',
+                           files=(CRANKS, FILE))) as simulator:
+        assert simulator.program.wait() == 1, simulator.program.stderr
+        assert simulator.program.stderr.splitlines()[-1].endswith(
+            'leg_1 cannot reach: 2.93 mm missing')
 
 
 def test_topics_and_messages_have_the_same_types() -> None:

@@ -30,7 +30,7 @@ def plants(p: SimulatorParameters) -> tuple[Plant, Plant]:
 
 
 def numbers(state: PlantState) -> Any:
-    return np.concatenate([state.lengths, state.rates, state.pose, state.twist, state.forces])
+    return np.concatenate([state.positions, state.rates, state.pose, state.twist, state.efforts])
 
 
 def test_under_torques_it_moves_as_under_the_forces() -> None:
@@ -73,7 +73,7 @@ def test_with_losses_torques_give_the_acceleration_and_forces_that_need_them(see
         state = plant._run(0)
         # A hexapod whose rotors dominate has little acceleration for a lot of torque.
         assert relative(state.acceleration, motion.rows[18:24]) < 1e-9
-        assert relative(state.forces, forces) < 1e-9
+        assert relative(state.efforts, forces) < 1e-9
         assert state.motors.angles == pytest.approx(tuple(motors.angles), rel=1e-12)
         assert state.motors.torques == tuple(motors.torques)
 
@@ -104,7 +104,7 @@ def test_a_closed_loop_by_torques_tracks_as_by_forces(efficiency: float) -> None
         error = np.empty((600, 6))
         for n in range(600):
             state = plant.state
-            error[n] = result.lengths[n] - state.lengths
+            error[n] = result.lengths[n] - state.positions
             push = 4e5 * error[n] + 1e4 * (result.rates[n] - state.rates)
             plant.advance(tuple((feed[n] + scale * push).tolist()), ZERO)
         errors.append(error)

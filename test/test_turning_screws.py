@@ -217,14 +217,14 @@ def test_an_end_stop_pushes_along_its_leg_alone(commands: str) -> None:
     for _ in range(200):
         before = plant.state
         state = plant.advance(zero, up)
-        over = np.array(state.lengths) - most
+        over = np.array(state.positions) - most
         if (over > 1e-5).any():
             break
-    assert (over > 1e-5).any() and before.lengths != state.lengths
+    assert (over > 1e-5).any() and before.positions != state.positions
     at = Motion.of_rows(np.concatenate([
         state.pose[:3], Rotation.from_quat(state.pose[3:]).as_matrix().ravel(), state.twist,
         np.zeros(6)]))
-    forces = np.array(state.forces)
+    forces = np.array(state.efforts)
     # The wrench of the stops on the platform explains its acceleration.
     moving = at.rows.copy()
     moving[ACCELERATION] = state.acceleration

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
-from stewart_dynamics.legs import KINDS, TELESCOPIC
+from stewart_dynamics.legs import CRANK, KINDS
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.circles import circle_names
@@ -61,14 +61,16 @@ CONTROLLER = (
               'linear_acceleration.x .. are the readings where base.source is imu', '', ''))
 
 PAYLOAD = {each: f'payload.{each}' for each in ('mass', 'center_of_mass', 'inertia')}
-# Parameters of the node that the controller reads: all that the structure in C holds of telescopic
-# legs, the circles and the side of the platform from which parts of it follow, and the IMU. It
-# rejects other kinds of legs by their markers.
+# Parameters of the node that the controller reads: those that the structure in C holds or follows
+# from, and the IMU; not the pulses of servos, which hardware interfaces take.
 CONTROLLER_NAMES = ('joints', 'base_frame', *(
-    name for fields in (PLATFORM_FIELDS, PAYLOAD, LEG_FIELDS, TELESCOPIC.fields, LISTS)
+    name for fields in (PLATFORM_FIELDS, PAYLOAD, LEG_FIELDS, *(
+        kind.fields for kind in KINDS), LISTS)
     for name in fields.values()
-    if name != 'setpoint.sync_tolerance' and not name.startswith(TELESCOPIC.foreign)),
-    *(kind.marker for kind in KINDS if kind.marker), *circle_names('base'),
+    if name != 'setpoint.sync_tolerance' and not name.startswith('servo.')),
+    *(name for name in Parameters.table if name.startswith(tuple(
+        own for kind in KINDS for own in kind.own if own.endswith(('.', '_'))))
+      and not name.startswith('servo.')), *circle_names('base'),
     *circle_names('platform'), 'geometry.platform_side',
     'drive.rated_torque', 'drive.screw_rotation', 'drive.screw_hand', 'singularity.action',
     'limits.action', 'base.source', 'base.timeout', 'base.imu.position', 'base.imu.orientation',
@@ -169,7 +171,9 @@ def _declaration(parameter: Parameter) -> dict[str, Any]:
     fields: dict[str, Any] = {
         'type': parameter.kind + '_array' * array, 'description': f'{parameter.text}{unit}'}
     required = parameter.required and not parameter.instead
-    if parameter.default is not None:
+    if any(parameter.name in kind.defaults for kind in KINDS):
+        fields['default_value'] = []  # by the kind of legs
+    elif parameter.default is not None:
         fields['default_value'] = list(parameter.default) if array else parameter.default
     elif array and not required:
         fields['default_value'] = []  # not set: others are given in its place
@@ -328,6 +332,10 @@ def pages() -> dict[Path, dict[str, str]]:
             'parameters of motion cueing': rows({
                 name: parameter for name, parameter in Parameters.table.items()
                 if name.startswith('cueing.')})},
+        ROOT / 'docs' / 'cranks.md': {
+            'parameters of cranks': rows({
+                name: parameter for name, parameter in Parameters.table.items()
+                if name.startswith(CRANK.own)})},
         ROOT / 'docs' / 'simulator.md': {
             'errors in the loop': loop(figures), 'errors on a ship': ship(on_a_ship)},
         ROOT / 'docs' / 'identify_from_bags.md': {

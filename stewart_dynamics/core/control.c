@@ -20,6 +20,7 @@ static void solve_unloaded(
   }
 }
 
+#include "drives.c"
 #include "home.c"
 #include "imu.c"
 #include "governor.c"

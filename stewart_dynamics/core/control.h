@@ -85,6 +85,27 @@ typedef struct {
 /* A governed stream, with its last demand; time nan: it has none yet. */
 typedef struct { double time; coordinates demand; governor_state governor; } governed_stream;
 
+/* The drives in a step, whatever the legs are: positions, rates and demanded efforts, of telescopic
+ * legs [m, m/s, N], of cranks [rad, rad/s, N m]; limits; flags: a position is below or above its
+ * limits. */
+typedef struct {
+  double positions[6], rates[6], efforts[6], rate_max[6], effort_max[6], below[6], above[6];
+} drive_values;
+
+void put_drives(
+  const stewart_platform * platform, const stewart_output * output, drive_values * drives);
+
+/* Axes of motors and directions of cranks (6, 3) of headings [rad]: level, and positive angles
+ * lift the ends of the cranks. */
+void level_cranks(const double * headings, double * axes, double * directions);
+
+/* Writes the branches of cranks: those that are wanted, 1 or -1, and for 0 the one whose angle at
+ * home is within the limits; angles (6, 2): of the branches 1 and -1 at home [rad], nan where the
+ * rod does not reach. Returns 0; or the leg, from 1, of which none is possible, from 7, of which both
+ * are. */
+int64_t choose_branches(
+  stewart_platform * platform, const stewart_pose * home, const double * wanted, double * angles);
+
 /* Six joints on a circle about the z axis of their frame [m]; angles from x toward y [rad]. */
 void joints_on_circle(double radius, const double * angles, double height, double * joints);
 

@@ -236,6 +236,7 @@ static double crank_lever_time(
   if (!(left > 0.0)) {return 0.0;}
   return rate < 0.0 ? -left / rate : HUGE_VAL;
 }
+static int crank_given(const stewart_leg * leg) {return leg->crank_length > 0.0;}
 
 /* The rod as two points with a coupling, and the crank with the point at its end: exact where the
    rod has no inertia about its own axis. */
@@ -267,9 +268,11 @@ static void crank_complete(stewart_leg * leg) {
   if (!isfinite(leg->home_position)) {leg->home_position = 0.0;}
   put_unit(leg->crank_axis);
   vector z = read3(leg->crank_direction), u = read3(leg->crank_axis);
-  double across = dot(z, u);
-  if (fabs(across) <= RIGHT_ANGLE * norm(z)) {
-    put3(leg->crank_direction, subtract(z, scale(across, u)));
+  double across = fabs(dot(z, u)), size_of_z = norm(z);
+  if (across <= RIGHT_ANGLE * size_of_z) {
+    if (across > 1e-15 * size_of_z) {  /* a complete leg stays as it is, to the bit */
+      put3(leg->crank_direction, subtract(z, scale(dot(z, u), u)));
+    }
     put_unit(leg->crank_direction);
   }
 }
@@ -299,6 +302,12 @@ static int crank_check(const stewart_platform * platform, const stewart_leg * le
   if (!(leg->lever_min >= 0.0)) {return STEWART_RULE_LIMIT;}
   if (!(leg->lever_min < 1.0)) {return STEWART_RULE_LEVER;}
   if (!(leg->angle_min < leg->angle_max)) {return STEWART_RULE_ANGLES;}
+  double at_min = leg->servo_angle_at_min, at_max = leg->servo_angle_at_max;
+  if (isnan(at_min) != isnan(at_max)) {return STEWART_RULE_SERVO_POINTS;}
+  if (at_min == at_max) {return STEWART_RULE_SERVO_ANGLES;}
+  if (!isnan(at_min) && !(leg->servo_pulse_min < leg->servo_pulse_max)) {
+    return STEWART_RULE_SERVO_PULSES;
+  }
   return platform->with_clearance ? STEWART_RULE_SHAPE : STEWART_VALID;
 }
 
@@ -320,10 +329,32 @@ static double crank_position(
   return crank_angle(leg, &at);
 }
 
+/* (k / L1)' = n . B' / L2 - q' (L1 / L2 + d . e): no division by k. */
+static lever_slope crank_slope_at(const stewart_leg * leg, const crank_pose * at) {
+  lever_slope of;
+  double size = leg->crank_length, rod = leg->rod_length;
+  of.ratio = leg->branch * at->line.lever / size;
+  of.of_drive = -leg->branch * (size / rod + dot(at->line.direction, at->along));
+  of.of_joint = scale(leg->branch / rod, at->normal);
+  return of;
+}
+
+static lever_slope crank_slope(
+  const stewart_leg * leg, const double position[3], const double r[9]) {
+  crank_pose at = crank_pose_of(leg, position, r);
+  return crank_slope_at(leg, &at);
+}
+
+/* The lever is one of what changes, by its own magnitude: in half of it a step does not come to the
+   dead centre, and not from one side of it to the other. */
 static measured_leg crank_measured(const stewart_leg * leg, const stewart_motion * motion) {
   crank_motion of = crank_motion_of(leg, motion);
+  lever_slope lever = crank_slope_at(leg, &of.at);
+  double lever_rate = lever.of_drive * of.drive.rate + dot(lever.of_joint, of.end_rate);
   double pace = largest(fabs(of.drive.rate), norm(of.end_rate) / leg->rod_length);
-  measured_leg to = {of.drive.position, of.drive.rate, pace < HUGE_VAL ? pace : HUGE_VAL};
+  if (lever_rate != 0.0) {pace = largest(pace, fabs(lever_rate) / lever.ratio);}
+  measured_leg to = {of.drive.position, of.drive.rate, HUGE_VAL};
+  if (lever.ratio >= 0.0 && pace < HUGE_VAL) {to.pace = pace;}
   return to;
 }
 

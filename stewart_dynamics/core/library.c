@@ -95,6 +95,7 @@ static void solve_unloaded(
 #include "setpoints.c"
 #include "messages.c"
 #include "plant.c"
+#include "drives.c"
 #include "home.c"
 #include "imu.c"
 #include "governor.c"

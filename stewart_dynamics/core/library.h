@@ -56,8 +56,11 @@ typedef struct {
   double code;
 } one_measurement;
 
-/* End stops: a spring and a damper at either end of the stroke, lengths infinite without. */
-typedef struct { double shortest[6], longest[6], stiffness[6], damping[6]; } end_stops;
+/* End stops: a spring and a damper at either end of the drive's travel, infinite without, and
+   where the lever of a leg is least, 0 without. */
+typedef struct {
+  double lowest[6], highest[6], least_lever[6], stiffness[6], damping[6];
+} end_stops;
 
 /* The simulated hexapod, its commands and loads in a period, and its state after it. */
 typedef struct {
@@ -65,14 +68,15 @@ typedef struct {
 } plant_state;
 
 typedef struct {
-  double by_torques;                   /* flag: commands are torques */
+  double by_torques;                   /* flag: commands are torques of the motors */
   double steps, step;                  /* in a period, and the length of one [s] */
   end_stops stops;
-  double force_max[6];
+  double effort_max[6];
   double commands[6], wrench[6];       /* [N] or [N m]; on the platform [N, N m] */
   stewart_base bases[3];               /* at begin, middle and end of the period */
   plant_state state;
-  double lengths[6], rates[6], forces[6], acceleration[6];
+  double positions[6], rates[6], efforts[6], acceleration[6];
+  double lever_ratios[6];              /* 1 at most, 0 at a dead centre */
   double sound;                        /* all steps could be computed */
   stewart_motors motors;
 } one_plant;

@@ -1,7 +1,7 @@
 /* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * The simulated hexapod: motion under leg forces or motor torques, integrated at a fixed step.
+ * The simulated hexapod: motion under efforts of the drives or motor torques, integrated at a fixed step.
  * Method and equations: simulator/plant.py.
  */
 
@@ -10,11 +10,11 @@
 #define LARGEST_MOVE 0.5   /* of a step: turn [rad], or a joint's move by its leg's length */
 
 /* Write the acceleration of a motion under motor torques, which are clipped to those available,
-   and the forces of the legs; `others` act along the legs, not through their screws. */
+   and the efforts of the drives; `others` act on the drives, not through screws or gears. */
 static void accelerate_by_torques(
   const stewart_platform * platform, stewart_motion * motion, double torques[6],
   const double others[6], const double wrench[6],
-  const stewart_base * base, double forces[6]) {
+  const stewart_base * base, double efforts[6]) {
   stewart_platform changed = *platform;
   double power[6], factor[6], pushes[6];
   for (int k = 0; k < 3; k++) {
@@ -40,7 +40,7 @@ static void accelerate_by_torques(
       drive_motion of = drive_of(platform, i, motion);
       double inertial = leg->reflected_mass * of.acceleration;
       double through = (leg->motor_ratio * torques[i] - inertial) / factor[i];
-      forces[i] = through + inertial;
+      efforts[i] = through + inertial;
       if ((through * of.rate > 0.0) != (power[i] > 0.0) && (settled || attempt < CAREFUL)) {
         power[i] = through * of.rate, settled = 0;
       }
@@ -48,12 +48,31 @@ static void accelerate_by_torques(
   }
 }
 
-/* Return the force of a leg's end stops [N]: springs and dampers, which never pull. */
-static double stop_force(const end_stops * stops, int i, double length, double rate) {
-  double too_short = stops->shortest[i] - length, too_long = length - stops->longest[i];
+/* Return the effort of a drive's end stops [N or N m]: springs and dampers, which never pull. */
+static double stop_effort(const end_stops * stops, int i, double position, double rate) {
+  double too_low = stops->lowest[i] - position, too_high = position - stops->highest[i];
   double spring = stops->stiffness[i], damper = stops->damping[i] * rate;
-  if (too_short > 0.0) {return largest(0.0, spring * too_short - damper);}
-  return too_long > 0.0 ? -largest(0.0, spring * too_long + damper) : 0.0;
+  if (too_low > 0.0) {return largest(0.0, spring * too_low - damper);}
+  return too_high > 0.0 ? -largest(0.0, spring * too_high + damper) : 0.0;
+}
+
+/* Add the end stop near a dead centre, which acts on drive and platform joint by the slope of the
+   lever: to the effort of the drive, and to the wrench on the platform. */
+static void add_lever_stop(
+  const stewart_platform * platform, const end_stops * stops, int i,
+  const stewart_motion * motion, double rate, double * effort, double wrench[6]) {
+  lever_slope lever = lever_slope_of(platform, i, motion->position, motion->rotation);
+  double too_near = stops->least_lever[i] - lever.ratio;
+  if (!(too_near > 0.0)) {return;}
+  vector arm = rotate(motion->rotation, read3(platform->legs[i].platform_joint));
+  vector joint = add(
+    read3(motion->linear_velocity), cross(read3(motion->angular_velocity), arm));
+  double lever_rate = lever.of_drive * rate + dot(lever.of_joint, joint);
+  double push = largest(0.0, stops->stiffness[i] * too_near - stops->damping[i] * lever_rate);
+  vector force = scale(push, lever.of_joint);
+  *effort += push * lever.of_drive;
+  put3(wrench, add(read3(wrench), force));
+  put3(wrench + 3, add(read3(wrench + 3), cross(arm, force)));
 }
 
 /* Write the rotation of a quaternion, which within a step is not of unit length. */
@@ -78,8 +97,8 @@ static void move_base(const one_plant * plant, double part, stewart_base * base)
   }
 }
 
-/* The motion of a state, its forces and, where they are the commands, the clipped torques. */
-typedef struct { stewart_motion motion; double forces[6], torques[6]; } driven_motion;
+/* The motion of a state, its efforts and, where they are the commands, the clipped torques. */
+typedef struct { stewart_motion motion; double efforts[6], torques[6]; } driven_motion;
 
 /* Write a state's time derivative under its loads and a motion of the base. */
 static driven_motion differentiate(
@@ -98,7 +117,7 @@ static driven_motion differentiate(
   for (int k = 0; k < 6; k++) {load_of_all[k] = plant->wrench[k];}
   for (int i = 0; i < 6; i++) {
     measured_leg leg = measured_of(platform, i, &of.motion);
-    stop[i] = stop_force(&plant->stops, i, leg.position, leg.rate);
+    stop[i] = stop_effort(&plant->stops, i, leg.position, leg.rate);
     if (by_wrench) {
       leg_line at = line_of(platform, i, of.motion.position, of.motion.rotation);
       double row[6];
@@ -106,14 +125,18 @@ static driven_motion differentiate(
       for (int k = 0; k < 6; k++) {load_of_all[k] += stop[i] * row[k];}
       stop[i] = 0.0;
     }
+    if (plant->stops.least_lever[i] > 0.0) {
+      add_lever_stop(
+        platform, &plant->stops, i, &of.motion, leg.rate, &stop[i], load_of_all);
+    }
     of.torques[i] = plant->commands[i];
-    of.forces[i] = of.torques[i] + stop[i];
+    of.efforts[i] = of.torques[i] + stop[i];
   }
   if (plant->by_torques > 0.0) {
     accelerate_by_torques(platform, &of.motion, of.torques, stop, load_of_all,
-                          base, of.forces);
+                          base, of.efforts);
   } else {
-    accelerate(platform, &of.motion, of.forces, load_of_all, base);
+    accelerate(platform, &of.motion, of.efforts, load_of_all, base);
   }
   vector imaginary = read3(state->quaternion);
   put3(slope->position, velocity);
@@ -125,8 +148,8 @@ static driven_motion differentiate(
   return of;
 }
 
-/* Write the positions and rates of the legs; return the largest of the angular speed and of how fast
-   they change [1/s]; infinite where a leg has no length. */
+/* Write the positions, rates and levers of the legs; return the largest of the angular speed and of
+   how fast they change [1/s]; infinite where a leg has no length or does not reach. */
 static double write_legs(
   const stewart_platform * platform, const plant_state * state, one_plant * plant) {
   stewart_motion motion = {{0.0}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}};
@@ -137,7 +160,9 @@ static double write_legs(
   put_rotation(state->quaternion, motion.rotation);
   for (int i = 0; i < 6; i++) {
     measured_leg leg = measured_of(platform, i, &motion);
-    plant->lengths[i] = leg.position, plant->rates[i] = leg.rate;
+    plant->positions[i] = leg.position, plant->rates[i] = leg.rate;
+    plant->lever_ratios[i] =
+      lever_slope_of(platform, i, motion.position, motion.rotation).ratio;
     fastest = largest(fastest, leg.pace);
   }
   return fastest;
@@ -183,9 +208,9 @@ void plant_advance(const stewart_platform * platform, one_plant * plant) {
   plant_state after, slope;
   int by_torques = plant->by_torques > 0.0;
   for (int i = 0; i < 6 && !by_torques; i++) {
-    double most = plant->force_max[i];
+    double most = plant->effort_max[i];
     plant->commands[i] = least(largest(plant->commands[i], -most), most);
-    plant->forces[i] = plant->commands[i];
+    plant->efforts[i] = plant->commands[i];
   }
   int sound = plant->step * write_legs(platform, &plant->state, plant) <= LARGEST_MOVE;
   for (int64_t k = 0; k < (int64_t)plant->steps; k++) {
@@ -198,15 +223,15 @@ void plant_advance(const stewart_platform * platform, one_plant * plant) {
   driven_motion of =
     differentiate(platform, plant, &plant->state, &base, &slope);
   sound = sound && all_finite(slope.twist, sizeof slope.twist);
-  for (int i = 0; i < 6 && by_torques; i++) {plant->forces[i] = of.forces[i];}
+  for (int i = 0; i < 6 && by_torques; i++) {plant->efforts[i] = of.efforts[i];}
   if (platform->with_motors) {
-    put_motors(platform, &of.motion, plant->forces, plant->forces, &plant->motors);
+    put_motors(platform, &of.motion, plant->efforts, plant->efforts, &plant->motors);
     for (int i = 0; i < 6 && by_torques; i++) {plant->motors.commands[i] = of.torques[i];}
   }
   for (int i = 0; i < 6; i++) {
     plant->acceleration[i] = sound ? slope.twist[i] : 0.0;
     if (!sound) {
-      plant->state.twist[i] = plant->forces[i] = 0.0;
+      plant->state.twist[i] = plant->efforts[i] = 0.0;
       plant->motors.speeds[i] = plant->motors.commands[i] = 0.0;
     }
   }

@@ -373,6 +373,7 @@ static leg_line line_from(
    positions, efforts, commands: of the drives, among the results and the outputs.
    rate_max, lever_ratio: limit of the drive's rate; magnitude of the lever by its largest.
    lever_time: until the lever falls to its limit [s].
+   given: whether a leg is of this kind, unless a later one is given as well.
    complete, check: see stewart_complete, stewart_check.
    For the library, in the second part of the file: see legs.c. */
 #include "telescopic.h"
@@ -501,6 +502,15 @@ static double lever_time_of(
   switch (platform->leg_kind) {
     default: STEWART_LEG_KINDS(RETURN, lever_time, (&platform->legs[i], motion, lever))
   }
+}
+
+static int kind_of(const stewart_leg * leg) {
+  int kind = STEWART_TELESCOPIC;
+#define GIVEN(number, NAME, prefix, function, arguments) \
+  if (prefix ## _ ## function arguments) {kind = number;}
+  STEWART_LEG_KINDS(GIVEN, given, (leg))
+#undef GIVEN
+  return kind;
 }
 
 static void complete_leg(int kind, stewart_leg * leg) {
@@ -646,6 +656,24 @@ int stewart_missing_distances(
     distances[i] = missing_distance(platform, i, pose->position, pose->rotation);
   }
   return code;
+}
+
+int stewart_servo_pulses(
+  const stewart_platform * platform, const double angles[6], double pulses[6]) {
+  double found[6];
+  if (!platform || !angles || !pulses) {return STEWART_NULL;}
+  if (!all_finite(angles, 6 * sizeof(double))) {return STEWART_NOT_FINITE;}
+  for (int i = 0; i < 6; i++) {
+    const stewart_leg * leg = &platform->legs[i];
+    double least_pulse = leg->servo_pulse_min, span = leg->servo_pulse_max - least_pulse;
+    double turn = leg->servo_angle_at_max - leg->servo_angle_at_min;
+    double part = (angles[i] - leg->servo_angle_at_min) / turn;
+    if (!(fabs(turn) > 0.0)) {return STEWART_NO_SERVOS;}
+    if (!(fabs(part - 0.5) <= 0.5 + LIMIT_TOLERANCE)) {return STEWART_SERVO_RANGE;}
+    found[i] = least(largest(least_pulse + span * part, least_pulse), leg->servo_pulse_max);
+  }
+  for (int i = 0; i < 6; i++) {pulses[i] = found[i];}
+  return STEWART_OK;
 }
 
 /* Set the numbers that some kinds of legs do not have to zero. */
@@ -1150,7 +1178,7 @@ void stewart_complete(stewart_platform * platform) {
   double extent, radius = mean_radius(platform, &extent);
   if (!(platform->characteristic_length > 0.0)) {platform->characteristic_length = radius;}
   platform->with_joint_angles = 0;
-  platform->leg_kind = platform->legs[0].crank_length > 0.0 ? STEWART_CRANK : STEWART_TELESCOPIC;
+  platform->leg_kind = kind_of(&platform->legs[0]);
   platform->with_clearance = isfinite(platform->leg_clearance_min);
   for (int i = 0; i < 6; i++) {
     stewart_leg * leg = &platform->legs[i];
@@ -1232,9 +1260,7 @@ static int check_leg_rules(const stewart_platform * platform, const stewart_leg 
         leg->coulomb_friction >= 0.0)) {return STEWART_RULE_ACTUATOR;}
   if (!(leg->coulomb_velocity > 0.0)) {return STEWART_RULE_COULOMB_VELOCITY;}
   if (!limits) {return STEWART_RULE_LIMIT;}
-  if ((leg->crank_length > 0.0) != (platform->legs[0].crank_length > 0.0)) {
-    return STEWART_RULE_KIND;
-  }
+  if (kind_of(leg) != platform->leg_kind) {return STEWART_RULE_KIND;}
   int rule = check_kind(platform, leg);
   if (rule != STEWART_VALID) {return rule;}
   if (!has_direction(leg->base_joint_axis)) {return STEWART_RULE_BASE_AXIS;}

@@ -40,7 +40,9 @@ enum {
   STEWART_NO_POSE = 8,        /* no pose with these lengths found from this guess */
   STEWART_NO_MOTORS = 9,      /* actuator.screw_lead is not in the parameters */
   STEWART_BROKEN_RULE = 10,   /* of the hexapod: stewart_check says which */
-  STEWART_UNREACHABLE = 11    /* a rod does not reach from its crank to the platform */
+  STEWART_UNREACHABLE = 11,   /* a rod does not reach from its crank to the platform */
+  STEWART_NO_SERVOS = 12,     /* servo.* is not in the parameters */
+  STEWART_SERVO_RANGE = 13    /* an angle is outside the two angles of servo.* */
 };
 
 /* Kinds of legs, a line each: number, name, and prefix of its functions. */
@@ -129,6 +131,8 @@ typedef struct {
                                                                    xx xy xz yy yz zz */
   double rod_mass, rod_center_of_mass, rod_inertia; /* CoM from the end of the crank; by default of
                                                        a uniform rod */
+  double servo_pulse_min, servo_pulse_max;          /* [s]; with the angles at them [rad]: */
+  double servo_angle_at_min, servo_angle_at_max;
   /* Written by stewart_complete: turn of the motor by metre [rad/m]; metres by turn of the leg
    * [m/rad]; losses of a motor that drives, and is driven, less 1; rate below which they are
    * linear [m/s]. */
@@ -138,8 +142,8 @@ typedef struct {
    * end, about the base joint. */
   double crank_end_mass, coupling_mass, platform_end_mass;
   double turning_moment[2], turning_inertia[6];
-  /* Position of the drive at home: halfway between its limits, if it has both; else zero_length, or
-   * the angle 0. */
+  /* Position of the drive at home: halfway between its limits, if it has both; else zero_length,
+   * or the angle 0. */
   double home_position;
 } stewart_leg;
 
@@ -304,7 +308,11 @@ typedef struct {
   RULE(36, BRANCH, "geometry.crank_branch", "must be positive or negative") \
   RULE(37, CRANK_INERTIA, "legs.crank.inertia", "must be positive semidefinite") \
   RULE(38, ANGLES, "limits.angle_min", "must be less than limits.angle_max") \
-  RULE(39, LEVER, "limits.lever_min", "must be less than 1")
+  RULE(39, LEVER, "limits.lever_min", "must be less than 1") \
+  RULE(40, SERVO_POINTS, "servo.angle_at_min, servo.angle_at_max", \
+       "not set: needed by servo.*") \
+  RULE(41, SERVO_ANGLES, "servo.angle_at_min", "must differ from servo.angle_at_max") \
+  RULE(42, SERVO_PULSES, "servo.pulse_min", "must be less than servo.pulse_max")
 #define STEWART_RULE_CODE(code, NAME, parameters, rule) STEWART_RULE_ ## NAME = code,
 
 enum { STEWART_RULES(STEWART_RULE_CODE) STEWART_VALID = 0 };
@@ -373,6 +381,13 @@ int stewart_add_payload(
 /* Writes by how much each leg misses the platform joint of a pose [m]; 0: it reaches it. */
 int stewart_missing_distances(
   const stewart_platform * platform, const stewart_pose * pose, double distances[6]);
+
+/* Writes the pulse widths [s] that turn servos to angles [rad], on the line through the two points
+ * of servo.*, never outside servo_pulse_min and servo_pulse_max. Written with STEWART_OK alone;
+ * STEWART_SERVO_RANGE: an angle is past one of the points; STEWART_NOT_FINITE: a leg does not
+ * reach. */
+int stewart_servo_pulses(
+  const stewart_platform * platform, const double angles[6], double pulses[6]);
 
 /* The rotation, row by row, of a quaternion x y z w; written with STEWART_OK alone. */
 int stewart_rotation(const double quaternion[4], double rotation[9]);

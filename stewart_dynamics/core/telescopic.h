@@ -224,6 +224,8 @@ static double telescopic_lever_time(
   const stewart_leg * leg, const stewart_motion * motion, double lever)
 {(void)leg, (void)motion, (void)lever; return HUGE_VAL;}
 
+static int telescopic_given(const stewart_leg * leg) {(void)leg; return 1;}
+
 static void telescopic_complete(stewart_leg * leg) {
   double gear = leg->gear_ratio, ratio = leg->screw_lead > 0.0 ?
     2.0 * PI * gear / leg->screw_lead : (double)NAN;
@@ -268,6 +270,13 @@ static measured_leg telescopic_measured(const stewart_leg * leg, const stewart_m
   vector joint = add(read3(motion->linear_velocity), turning);
   measured_leg of = {at.length, dot(at.direction, joint), HUGE_VAL};
   if (0.0 < at.length && at.length < HUGE_VAL) {of.pace = at.per_length * norm(joint);}
+  return of;
+}
+
+static lever_slope telescopic_slope(
+  const stewart_leg * leg, const double position[3], const double r[9]) {
+  lever_slope of = {1.0, 0.0, {0.0, 0.0, 0.0}};
+  (void)leg, (void)position, (void)r;
   return of;
 }
 

@@ -15,10 +15,11 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.core.binding import header
+from stewart_dynamics.core.binding import header, places
 from stewart_dynamics.errors import shown, StewartError
-from stewart_dynamics.export.golden_vectors import COLUMNS, golden_vectors, PARTS, WHOLE
-from stewart_dynamics.legs import require_kind
+from stewart_dynamics.export.golden_vectors import (
+    columns_of, golden_vectors, parts_of, result_columns, RESULT_COLUMNS, whole_columns)
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
@@ -37,6 +38,7 @@ wchar_t while xor xor_eq""".split())
 _TAKEN = frozenset(['all', 'clean', 'compare', 'eof', 'golden', 'help', 'huge_val', 'infinity',
                     'install', 'linux', 'main', 'null', 'package', 'printf', 'stderr', 'stdin',
                     'stdout', 'test', 'test_golden', 'unix', *vars(math)])
+_RESULT = places('stewart_result')
 _LONGEST = 63  # significant characters of an identifier in C99
 
 
@@ -75,27 +77,45 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
         are not, and there is no home pose.
     """
     check_name(name)
-    require_kind(parameters, 'exported source')
     head = (f'A hexapod, written by stewart_export {__version__}.\n'
             f' * SHA-256 of its parameters: {digest(parameters)}')
-    rows = golden_vectors(parameters).tolist()
-    begins = [COLUMNS.index(names[0]) for names in PARTS.values()]
+    kind = parameters.leg_kind
+    rows, columns = golden_vectors(parameters).tolist(), columns_of(kind)
+    parts, whole = parts_of(kind), whole_columns(kind)
+    begins = [columns.index(names[0]) for names in parts.values()]
     texts = {
         '@HEAD@': head, '@NAME@': name, '@PLATFORM@': platform_source(parameters, name),
         '@PARTS@': ',\n  '.join(f'{part} = {begin}'
-                                for part, begin in zip(PARTS, begins, strict=True)),
-        '@COLUMNS@': str(len(COLUMNS)),
+                                for part, begin in zip(parts, begins, strict=True)),
+        '@COLUMNS@': str(len(columns)), '@MORE@': _comparisons(kind),
+        '@POSITIONS@': _result(kind.position.columns.start),
+        '@DEMANDED@': kind.effort.field, '@EFFORT@': kind.effort.name,
+        '@PUBLISHED@': kind.commands, '@PUBLISHEDPART@': kind.commands.upper(),
         '@VECTORS@': ',\n'.join(f'  {{{", ".join(map(hexadecimal, row))}}}' for row in rows)}
 
     def filled(file: str) -> str:
         return re.sub('@[A-Z]+@', lambda found: texts[found[0]], source(f'{file}.in'))
 
-    csv = '\n'.join([','.join(COLUMNS), *(','.join(
-        repr(int(value) if column in WHOLE else value)
-        for column, value in zip(COLUMNS, row, strict=True)) for row in rows), ''])
+    csv = '\n'.join([','.join(columns), *(','.join(
+        repr(int(value) if column in whole else value)
+        for column, value in zip(columns, row, strict=True)) for row in rows), ''])
     return {**{each: source(each) for each in SOURCES}, f'{name}.h': filled('hexapod.h'),
             f'{name}.c': filled('hexapod.c'), 'golden.csv': csv,
             'test_golden.c': filled('test_golden.c'), 'CMakeLists.txt': filled('CMakeLists.txt')}
+
+
+def _comparisons(kind: LegKind) -> str:
+    """Return lines of test_golden.c for the results that hexapods of this kind alone have."""
+    return ''.join(
+        f'\n    differences += compare(\n      row, "{name}", output.result.{field}, '
+        f'wanted + {_result(_RESULT[field].start)}, 6);'
+        for name, field in ((name, RESULT_COLUMNS[name]) for name in result_columns(kind))
+        if isinstance(_RESULT[field], slice) and _RESULT[field].start >= LegKind.width)
+
+
+def _result(column: int) -> str:
+    """Return where a column of the results begins in a vector, as an expression of C."""
+    return f'RESULT + {column}' if column else 'RESULT'
 
 
 def digest(parameters: Parameters) -> str:

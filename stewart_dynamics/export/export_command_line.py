@@ -47,6 +47,9 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--linuxcnc', action='store_true',
                         help='write NAME_linuxcnc.hal, too: HAL lines for genhexkins, the '
                              'kinematics of LinuxCNC for hexapods')
+    parser.add_argument('--arduino', action='store_true',
+                        help='write NAME_arduino.zip, too: a library for the Arduino IDE with a '
+                             'sketch that moves six hobby servos; needs servo.*')
     parser.add_argument('--name', default='hexapod', metavar='NAME',
                         help='name of the hexapod in C (default: hexapod)')
     add_node(parser)
@@ -55,18 +58,17 @@ def _arguments() -> argparse.ArgumentParser:
 
 def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
     # Imported here, so that --help is fast.
+    from stewart_dynamics.export.arduino import arduino_library
     from stewart_dynamics.export.c_project import c_project, check_name
     from stewart_dynamics.export.drive_files import drive_files
     from stewart_dynamics.export.fmu import find_compiler, fmu, has_binaries
     from stewart_dynamics.export.linuxcnc import hal_lines
-    from stewart_dynamics.legs import require_kind
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
     name = check_name(given.name)
     parameters = Parameters.from_yaml(given.params, given.node)
-    require_kind(parameters, 'exported source')
     for mistake in likely_mistakes(parameters):
         _PROGRAM.complain(f'warning: {mistake}')
     files: dict[str, str | bytes] = {**c_project(parameters, name)}
@@ -78,6 +80,8 @@ def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
                               'computer is found ($CC, cc, gcc, clang)')
     if given.drives:
         files |= drive_files(parameters, name)
+    if given.arduino:
+        files[f'{name}_arduino.zip'] = arduino_library(parameters, name)
     if given.linuxcnc:
         files[f'{name}_linuxcnc.hal'] = hal_lines(parameters)
     for path in files_of_folder.write(files):

@@ -24,9 +24,10 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import places
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.export.c_project import digest, hexadecimal, platform_source, source, SOURCES
-from stewart_dynamics.legs import require_kind
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
@@ -38,24 +39,26 @@ from stewart_dynamics.parameters.table import INERTIA, Parameters, SUPPRESS_FORC
 
 # SI base units of each unit, by their exponents in FMI.
 _UNITS = {'m': {'m': 1}, 'm/s': {'m': 1, 's': -1}, 'm/s2': {'m': 1, 's': -2}, 'm3': {'m': 3},
-          'm3/s': {'m': 3, 's': -1}, 'rad/s': {'rad': 1, 's': -1},
+          'm3/s': {'m': 3, 's': -1}, 'rad': {'rad': 1}, 'rad/s': {'rad': 1, 's': -1},
           'rad/s2': {'rad': 1, 's': -2}, 'N': {'kg': 1, 'm': 1, 's': -2},
           'N.m': {'kg': 1, 'm': 2, 's': -2}, 'kg': {'kg': 1}, 'kg.m2': {'kg': 1, 'm': 2},
           's': {'s': 1}}
 # Units in which tools show a unit: name, and its value for 1 of the unit.
-_SHOWN = {'m': ('mm', 1e3), 'm/s': ('mm/s', 1e3), 'rad/s': ('deg/s', math.degrees(1.0)),
+_SHOWN = {'m': ('mm', 1e3), 'm/s': ('mm/s', 1e3), 'rad': ('deg', math.degrees(1.0)),
+          'rad/s': ('deg/s', math.degrees(1.0)),
           'rad/s2': ('deg/s2', math.degrees(1.0))}
 # Where an FMU has its binary: by version, system and processor.
 _FOLDERS = {('3', 'Linux', 'x86_64'): 'x86_64-linux', ('3', 'Linux', 'aarch64'): 'aarch64-linux',
             ('3', 'Darwin', 'x86_64'): 'x86_64-darwin', ('3', 'Darwin', 'arm64'): 'aarch64-darwin',
             ('2', 'Linux', 'x86_64'): 'linux64', ('2', 'Darwin', 'x86_64'): 'darwin64'}
 _COMPILERS = ('cc', 'gcc', 'clang')
+_LEVERS = 110  # FMU_LEVERS of fmu.h
 _NOISE = 1e-14  # parts of the largest coordinate of a pose: below it rounding errors
 _KINDS_OF_2 = {'Float64': 'Real', 'Int32': 'Integer', 'Boolean': 'Boolean'}
 
 
 class Variable(NamedTuple):
-    """A variable of the FMU; its value reference is its place in the list."""
+    """A variable of the FMU; its value reference is its place in the list, or is given."""
 
     name: str
     causality: str
@@ -63,6 +66,7 @@ class Variable(NamedTuple):
     unit: str = ''
     kind: str = 'Float64'  # type in FMI 3.0
     start: float | None = None  # None for outputs
+    reference: int | None = None
 
     @property
     def variability(self) -> str:
@@ -82,7 +86,8 @@ def variables(parameters: Parameters) -> list[Variable]:
     Return the variables in the order of ``fmu.h``; they start at rest at the home pose.
 
     Where the parameters do not give the height of the platform there, they start at a pose at
-    which the forces can be solved. The last variables are those of the motors, with drives.
+    which the forces can be solved. The last variables are those of the motors, with drives, and
+    of the levers, where the drives turn.
     """
     position, quaternion = _start_pose(parameters)
     start = [*position, *quaternion, *np.zeros(18), *parameters.gravity,
@@ -93,8 +98,14 @@ def variables(parameters: Parameters) -> list[Variable]:
              parameters.limits.action == SUPPRESS_FORCES]
     given = [*_inputs(), *_tunable()]
     return [*(each._replace(start=float(value))
-              for each, value in zip(given, start, strict=True)), *_outputs(),
-            *(_of_motors() if parameters.drives else ())]
+              for each, value in zip(given, start, strict=True)), *_outputs(parameters.leg_kind),
+            *(_of_motors() if parameters.drives else ()),
+            *(_of_levers() if has_levers(parameters.leg_kind) else ())]
+
+
+def has_levers(kind: LegKind) -> bool:
+    """Return whether results of a kind of legs have levers."""
+    return bool(places('stewart_result')['levers'].stop <= kind.width)
 
 
 def _start_pose(parameters: Parameters) -> tuple[Array, Array]:
@@ -165,12 +176,14 @@ def _of_legs(name: str, unit: str, text: str, kind: str = 'Float64') -> Iterator
         yield Variable(f'{name}[{leg}]', 'output', text.format(leg=leg), unit, kind)
 
 
-def _outputs() -> Iterator[Variable]:
+def _outputs(kind: LegKind) -> Iterator[Variable]:
+    position, rate, effort = kind.position, kind.rate, kind.effort
+    positive = effort.positive.replace('+', 'positive')
     for name, unit, text in (
-            ('lengths', 'm', 'length of leg {leg}'),
-            ('rates', 'm/s', 'rate of the length of leg {leg}'),
-            ('forces', 'N', 'force to command to leg {leg}, positive pushes; zero unless status '
-             'is 0'),
+            (position.field, position.unit, f'{position.name} of leg {{leg}}'),
+            (rate.field, rate.unit, f'rate of the {position.name} of leg {{leg}}'),
+            (effort.field, effort.unit.replace(' ', '.'), f'{effort.name} to command to leg '
+             f'{{leg}}, {positive}; zero unless status is 0'),
             ('joint_forces', 'N', 'force in rod and joints of leg {leg}, positive pushes; zero '
              'unless status is 0')):
         yield from _of_legs(name, unit, text)
@@ -192,6 +205,12 @@ def _of_motors() -> Iterator[Variable]:
                         'to command, not limited; zero unless status is 0')
 
 
+def _of_levers() -> Iterator[Variable]:
+    for n, each in enumerate(_of_legs(
+            'levers', 'm', 'lever of leg {leg}: its torque by the force of its rod')):
+        yield each._replace(reference=_LEVERS + n)
+
+
 def flat_name(name: str) -> str:
     """Return the name of a variable with letters, digits and _ alone: ``lengths_1``."""
     return re.sub(r'\W', '_', name.rstrip(']'))
@@ -210,7 +229,6 @@ def fmu(parameters: Parameters, name: str, version: str = '3',
         and ``position.x``.
     Raises StewartError: the compiler fails.
     """
-    require_kind(parameters, 'exported source')
     listed = variables(parameters)
     if flat:
         listed = [each._replace(name=flat_name(each.name)) for each in listed]
@@ -255,8 +273,13 @@ def _model_source(parameters: Parameters, listed: list[Variable], token: str) ->
         f' * SHA-256 of its parameters: {digest(parameters)} */', '',
         '#include "fmu.h"', '', '#include <math.h>', '',
         'static ' + platform_source(parameters, 'hexapod'),
-        'const stewart_platform * const fmu_platform = &hexapod;', '',
-        'const double fmu_start[FMU_LENGTHS] = {',
+        'const stewart_platform * const fmu_platform = &hexapod;',
+        f'const int fmu_with_levers = {int(has_levers(parameters.leg_kind))};', '',
+        *(f'const double * fmu_{of}(const stewart_output * output) {{return output->{field};}}'
+          for of, field in (('positions', f'result.{parameters.leg_kind.position.field}'),
+                            ('rates', f'result.{parameters.leg_kind.rate.field}'),
+                            ('efforts', parameters.leg_kind.commands))), '',
+        'const double fmu_start[FMU_POSITIONS] = {',
         *(f'  {hexadecimal(each.start or 0.0)},  /* {each.name}: {each.start:.9g} */'
           for each in start), '};', '', f'const char * const fmu_token = "{token}";', ''))
 
@@ -299,7 +322,10 @@ def _description(listed: list[Variable], name: str, token: str, version: str,
         for file in compiled:
             ET.SubElement(sources, 'File', name=file)
     units = ET.SubElement(root, 'UnitDefinitions')
+    used = {each.unit for each in listed}
     for unit, exponents in _UNITS.items():
+        if unit not in used:
+            continue
         group = ET.SubElement(units, 'Unit', name=unit)
         ET.SubElement(group, 'BaseUnit', {
             base: str(exponent) for base, exponent in exponents.items()})
@@ -308,7 +334,9 @@ def _description(listed: list[Variable], name: str, token: str, version: str,
             ET.SubElement(group, 'DisplayUnit', name=shown, factor=repr(factor))
     ET.SubElement(root, 'DefaultExperiment', startTime='0', stepSize='0.001')
     model = ET.SubElement(root, 'ModelVariables')
-    for reference, each in enumerate(listed):
+    references = [n if each.reference is None else each.reference
+                  for n, each in enumerate(listed)]
+    for reference, each in zip(references, listed, strict=True):
         general = {'name': each.name, 'valueReference': str(reference),
                    'causality': each.causality, 'variability': each.variability,
                    'description': each.description}
@@ -325,11 +353,11 @@ def _description(listed: list[Variable], name: str, token: str, version: str,
     structure = ET.SubElement(root, 'ModelStructure')
     for tag in ('Output', 'InitialUnknown'):
         group = structure if new else ET.SubElement(structure, f'{tag}s')
-        for reference, each in enumerate(listed):
+        for n, each in enumerate(listed):
             if each.causality == 'output' and new:
-                ET.SubElement(group, tag, valueReference=str(reference))
+                ET.SubElement(group, tag, valueReference=str(references[n]))
             elif each.causality == 'output':
-                ET.SubElement(group, 'Unknown', index=str(reference + 1))
+                ET.SubElement(group, 'Unknown', index=str(n + 1))
     return _text(root)
 
 

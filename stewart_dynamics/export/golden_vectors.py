@@ -16,13 +16,14 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND
-from stewart_dynamics.core.binding import CODES
+from stewart_dynamics.core.binding import CODES, places
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
-from stewart_dynamics.mechanics.rows import BASE, FORCES, MOTION, POSE, RESULT, WRENCH
+from stewart_dynamics.mechanics.rows import BASE, MOTION, POSE, RESULT, WRENCH
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import (
     Batch, FIRST, MOTOR_COMMANDS, Outputs, RISES, Step)
@@ -43,43 +44,73 @@ def _legs(name: str) -> list[str]:
     return [f'{name}_{leg}' for leg in range(1, 7)]
 
 
-# The columns of a vector, in parts: the inputs first, then the results.
-PARTS: dict[str, list[str]] = {
-    'STAMP': ['stamp'],
-    'HAS_BASE': ['has_base'],
-    'MOTION': [*_POSE, *_TWIST],
-    'WRENCH': ['fx', 'fy', 'fz', 'mx', 'my', 'mz'],
-    'BASE': [f'base_{part}_{axis}' for part in ('g', 'dv', 'w', 'dw') for axis in _XYZ],
-    'CODE': ['code'],
-    'RESULT': [*_legs('length'), *_legs('rate'), *_legs('demanded_force'), 'determinant',
-               'determinant_rate', 'condition_number', *_legs('unit_load_force'),
-               *_legs('joint_force')],
-    'FORCES': _legs('force'),
-    'EXCEEDED': _legs('exceeded'),
-    'WARNING': ['warning', 'stopped', 'crossings'],
-    'COMMANDS': _legs('motor_command'),
-    'RISES': _legs('winding_rise'),
-    'MOTOR_CODE': ['motor_code'],
-    'MOTORS': [*_legs('motor_angle'), *_legs('motor_speed'), *_legs('motor_acceleration'),
-               *_legs('motor_torque')],
-    'FOUND_CODE': ['found_code'],
-    'FOUND': [f'found_{name}' for name in _POSE],
-}
-"""
-Names of the columns: stamp [ns], SI units otherwise, base axes; torques are those of the demanded
-forces; ``found`` is the pose that the forward kinematics find for the lengths, from the last one.
-"""
-COLUMNS = [name for names in PARTS.values() for name in names]
-# Columns of whole numbers: stamps, flags, codes, bits of limits.
-WHOLE = {name for part in ('STAMP', 'HAS_BASE', 'CODE', 'EXCEEDED', 'WARNING', 'MOTOR_CODE',
-                           'FOUND_CODE') for name in PARTS[part]}
+# Fields of stewart_result by the names of their columns.
+RESULT_COLUMNS = {
+    'length': 'lengths', 'rate': 'rates', 'demanded_force': 'forces', 'determinant': 'determinant',
+    'determinant_rate': 'determinant_rate', 'condition_number': 'condition_number',
+    'unit_load_force': 'unit_load_forces', 'joint_force': 'joint_forces', 'angle': 'angles',
+    'speed': 'speeds', 'demanded_torque': 'torques', 'lever': 'levers'}
+_PLACES = places('stewart_result')
+
+
+def parts_of(kind: LegKind) -> dict[str, list[str]]:
+    """
+    Return the columns of a vector, in parts: the inputs first, then the results.
+
+    Stamp [ns], SI units otherwise, base axes; torques of motors are those of the demanded efforts;
+    ``found`` is the pose that the forward kinematics find for the positions of the drives, from
+    the last one.
+    """
+    return {
+        'STAMP': ['stamp'],
+        'HAS_BASE': ['has_base'],
+        'MOTION': [*_POSE, *_TWIST],
+        'WRENCH': ['fx', 'fy', 'fz', 'mx', 'my', 'mz'],
+        'BASE': [f'base_{part}_{axis}' for part in ('g', 'dv', 'w', 'dw') for axis in _XYZ],
+        'CODE': ['code'],
+        'RESULT': [column for name in result_columns(kind) for column in (
+            _legs(name) if isinstance(_PLACES[RESULT_COLUMNS[name]], slice) else [name])],
+        kind.commands.upper(): _legs(kind.effort.name),
+        'EXCEEDED': _legs('exceeded'),
+        'WARNING': ['warning', 'stopped', 'crossings'],
+        'COMMANDS': _legs('motor_command'),
+        'RISES': _legs('winding_rise'),
+        'MOTOR_CODE': ['motor_code'],
+        'MOTORS': [*_legs('motor_angle'), *_legs('motor_speed'), *_legs('motor_acceleration'),
+                   *_legs('motor_torque')],
+        'FOUND_CODE': ['found_code'],
+        'FOUND': [f'found_{name}' for name in _POSE],
+    }
+
+
+def result_columns(kind: LegKind) -> list[str]:
+    """Return the names of RESULT_COLUMNS that hexapods of a kind have, in the order of C."""
+    return [name for name, field in RESULT_COLUMNS.items()
+            if not isinstance(_PLACES[field], slice) or _PLACES[field].stop <= kind.width]
+
+
+def columns_of(kind: LegKind) -> list[str]:
+    """Return the names of all columns."""
+    return [name for names in parts_of(kind).values() for name in names]
+
+
+def whole_columns(kind: LegKind) -> set[str]:
+    """Return the names of columns of whole numbers: stamps, flags, codes, bits of limits."""
+    parts = parts_of(kind)
+    return {name for part in ('STAMP', 'HAS_BASE', 'CODE', 'EXCEEDED', 'WARNING', 'MOTOR_CODE',
+                              'FOUND_CODE') for name in parts[part]}
 
 
 def golden_vectors(parameters: Parameters) -> Array:
-    """Return the vectors (N, len(COLUMNS)); samples whose numbers overflow are left out."""
+    """
+    Return the vectors, a number for each of ``columns_of``.
+
+    Samples that the legs do not reach, or whose numbers overflow, are left out.
+    """
+    kind = parameters.leg_kind
     step = Step(parameters)
     hexapod = hexapod_structure(parameters)
-    drives = None if parameters.actuator.screw_lead is None else Drives(parameters)
+    drives = Drives(parameters) if not kind.ratio or parameters[kind.ratio] is not None else None
     motions = _motions(parameters)
     weight = parameters.carried.mass * 10.0 + 1.0
     phases = np.arange(_COUNT)[:, None] + np.arange(WRENCH + BASE)
@@ -100,10 +131,10 @@ def golden_vectors(parameters: Parameters) -> Array:
         forward_kinematics.poses(
             hexapod, outputs.drive_positions.copy(), guess, code, steps, residual)
         rows.append([
-            stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(outputs),
+            stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(kind, outputs),
             *_commanded(outputs), *_motors(drives, motions[n:n + 1], outputs), int(code[0]),
             *guess[0, :POSE.stop]])
-    return np.array(rows, dtype=float).reshape(-1, len(COLUMNS))
+    return np.array(rows, dtype=float).reshape(-1, len(columns_of(kind)))
 
 
 def _motions(parameters: Parameters) -> Array:
@@ -125,34 +156,28 @@ def _motions(parameters: Parameters) -> Array:
                   turning.linear_acceleration, turning.angular_acceleration).rows
 
 
-def _results(outputs: Outputs) -> list[float]:
+def _results(kind: LegKind, outputs: Outputs) -> list[float]:
     """Return the columns from CODE to WARNING of one setpoint's outputs."""
-    forces = outputs.efforts[0]
     code = SINGULAR if not outputs.solvable[0] else OK if outputs.with_efforts[0] else SUPPRESSED
     exceeded = outputs.records['exceeded'][0]
     state = outputs.singularity()
-    return [code, *outputs.drive_positions[0], *outputs.rates[0],
-            *_or_zero(outputs.demanded_efforts[0]),
-            outputs.determinants[0], outputs.determinant_rates[0], outputs.conditions[0],
-            *outputs.unit_load_forces[0], *_or_zero(outputs.joint_forces[0]), *_or_zero(forces),
+    row = outputs.rows[0]
+    return [code, *_or_zero(row[:kind.width]), *_or_zero(row[kind.published]),
             *exceeded, state.cause, state.stopped, state.crossings]
 
 
 def _commanded(outputs: Outputs) -> list[float]:
     """Return the columns of torques to command and of temperature rises, 0 for nan."""
-    numbers: Array = np.concatenate([outputs.rows[0, MOTOR_COMMANDS], outputs.rows[0, RISES]])
-    return [*np.where(np.isnan(numbers), 0.0, numbers)]
+    return [*_or_zero(np.concatenate([outputs.rows[0, MOTOR_COMMANDS], outputs.rows[0, RISES]]))]
 
 
-def _or_zero(forces: Array) -> Array:
-    """Return zeros for forces that are not known."""
-    return np.where(np.isnan(forces), 0.0, forces)
+def _or_zero(numbers: Array) -> Array:
+    """Return zeros for numbers that are not known."""
+    return np.where(np.isnan(numbers), 0.0, numbers)
 
 
 def _motors(drives: Drives | None, motions: Array, outputs: Outputs) -> list[float]:
-    """Return the columns MOTOR_CODE and MOTORS, for the demanded forces."""
+    """Return the columns MOTOR_CODE and MOTORS, for the demanded efforts."""
     if drives is None:
-        return [NO_MOTORS, *np.zeros(len(PARTS['MOTORS']))]
-    results = np.zeros((1, RESULT))
-    results[:, FORCES] = _or_zero(outputs.demanded_efforts)
-    return [OK, *drives(motions, results)[0, MECHANICAL]]
+        return [NO_MOTORS, *np.zeros(len(MECHANICAL))]
+    return [OK, *drives(motions, _or_zero(outputs.rows[:, :RESULT]))[0, MECHANICAL]]

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 KINDS: tuple[LegKind, ...] = (TELESCOPIC, CRANK)
 for _kind in KINDS:
-    _kind.foreign = tuple(name for each in KINDS if each is not _kind for name in each.own)
+    _kind.foreign = tuple(name for each in KINDS if each is not _kind for name in each.own
+                          if name not in _kind.own)
 
 
 def kind_of(values: Mapping[str, Any]) -> LegKind:

@@ -5,17 +5,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-import math
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
-from stewart_dynamics.core.binding import places
+from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.legs import crank_tree as tree
-from stewart_dynamics.legs.kind import LegKind, LegMass, Named, Placed, Solid, STANDARD_G
+from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
+from stewart_dynamics.legs.kind import (
+    AtHome, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import (
     AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
@@ -25,13 +25,16 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
 AUTO, POSITIVE, NEGATIVE = BRANCHES = 'auto', 'positive', 'negative'  # geometry.crank_branch
+_SIGNS = {AUTO: 0.0, POSITIVE: 1.0, NEGATIVE: -1.0}
 LEVER_MIN = 0.1
 """Default of ``limits.lever_min``: the lever near a dead centre by its largest value."""
 COULOMB_VELOCITY = 0.01
 """Default of ``actuator.coulomb_velocity`` for cranks [rad/s]."""
 HEADINGS, AXES, DIRECTIONS = (
     'geometry.crank_angles', 'geometry.crank_axes', 'geometry.crank_directions')
-_UPRIGHT = 0.5 * math.pi  # from its zero, farther than which no crank is at home by itself [rad]
+# A stop near a dead centre is expected to end motions before half of its lever, or before this.
+_DEEPEST = 0.5
+_LEAST_LEVER = 0.01
 
 
 class Crank(LegKind):
@@ -48,6 +51,9 @@ class Crank(LegKind):
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
     joint_force, joint_force_limit = 'rod_force', 'limits.rod_force_max'
     commands = 'torques'
+    simulated = 'leg_torque'
+    resolved = ('a crank turns by more than that, a joint moves by more than that part of its '
+                'rod, or a lever changes by more than that part of itself, as at a dead centre')
     gear, right_sign = 'gear', '+ must drive the angle up'
     wrong_units = (
         (1e-3, 'kN m in place of N m'), (1.0 / STANDARD_G, 'kgf m in place of N m'),
@@ -56,12 +62,14 @@ class Crank(LegKind):
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
-           'limits.lever_min')
+           'limits.lever_min', 'servo.', 'noise.angle', 'noise.speed', 'noise.torque')
     fields = {
         'crank_length': 'legs.crank.length', 'rod_length': 'legs.rod.length',
         'crank_axis': AXES, 'crank_direction': DIRECTIONS, 'crank_mass': 'legs.crank.mass',
         'rod_mass': 'legs.rod.mass', 'rod_center_of_mass': 'legs.rod.center_of_mass',
-        'rod_inertia': 'legs.rod.inertia', 'reflected_mass': 'actuator.reflected_inertia'}
+        'rod_inertia': 'legs.rod.inertia', 'reflected_mass': 'actuator.reflected_inertia',
+        **{f'servo_{name}': f'servo.{name}' for name in (
+            'pulse_min', 'pulse_max', 'angle_at_min', 'angle_at_max')}}
     masses = (
         *(LegMass(f'legs.crank.first_moment.{axis}', 'kg m') for axis in 'enu'),
         *(LegMass(f'legs.crank.inertia_about_axis.{axes}', 'kg m^2')
@@ -80,6 +88,7 @@ class Crank(LegKind):
     shortened = HEADINGS,
     likely = {'geometry.crank_branch': (AUTO,)}
     inertia_unit = 'kg m^2'
+    reflected, rotors = 'N^2 J', 'rotor and gear'
     friction_units = 'N m s/rad', 'N m'
     alternatives = (HEADINGS,), (AXES, DIRECTIONS)
     units = {'actuator.viscous_friction': 'N m s/rad', 'actuator.coulomb_friction': 'N m',
@@ -220,17 +229,63 @@ class Crank(LegKind):
         on_legs: Array = forces + torque * r
         return on_legs
 
-    def home_rule(self, parameters: Parameters) -> str:
-        """Return that the rods are shorter than the gap, or far too long."""
+    def stop_loads(self, parameters: Parameters) -> StopLoads:
+        """
+        Return the inertias of shafts and cranks, and the rods, which move with the platform.
+
+        The rod can have no energy but a positive one, so that shaft and crank alone are a bound of
+        the inertia of a drive. Of the slope of a lever, (k / L1)' = n . B' / L2 - q' (L1 / L2 +
+        d . e), the second part is at most c = 1 + L1 / L2 by the rate of the drive, and by
+        (a + b)^2 <= 1.25 a^2 + 5 b^2 the stop near a dead centre adds 1.25 c^2 to the stiffness at
+        the drive and 5 / L2^2 to that at the joint.
+        """
+        centers, inertias = crank_bodies(parameters)
+        mass = parameters['legs.crank.mass']
+        size, rods = parameters['legs.crank.length'], parameters['legs.rod.length']
+        inertia = (parameters['actuator.reflected_inertia'] + inertias[:, 5]
+                   + mass * np.sum(centers[:, :2] ** 2, axis=-1))
+        least = np.maximum(_DEEPEST * parameters['limits.lever_min'], _LEAST_LEVER)
+        return StopLoads(
+            inertia, float(np.sum(parameters['legs.rod.mass'])), (least * size, size),
+            1.0 + 1.25 * (1.0 + size / rods) ** 2, 5.0 / rods ** 2)
+
+    def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
+                      ratios: Sequence[float]) -> str:
+        """Return the leg that is nearest to a dead centre."""
+        leg = int(np.argmin(ratios))
+        return f'smallest lever: {joints[leg]}, {ratios[leg]:.3g} of its largest'
+
+    def reach(self, parameters: Parameters) -> Array:
+        """Return the lengths of the cranks."""
+        size: Array = parameters['legs.crank.length']
+        return size
+
+    def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[str]:
+        """Yield lengths in mm, and rods that are shorter than the gap at home."""
+        return crank_mistakes.wrong_sizes(parameters, anchors)
+
+    def likely_mistakes(self, parameters: Parameters, home: AtHome) -> Iterator[str]:
+        """Yield mistakes in signs and zeros of the cranks, their masses and limits."""
+        at = self.lines(parameters, home.position, home.rotation)
+        if not np.isfinite(at.directions).all():
+            return iter(())
         legs: Any = parameters.structure['legs']
-        with np.errstate(all='ignore'):
-            ends = crank_ends(parameters, legs['home_position'])
-        joints = parameters.geometry.platform_joints
-        gaps = np.linalg.norm(ends - ends.mean(axis=0) - joints + joints.mean(axis=0), axis=1)
+        position = crank_mistakes.above_motors(parameters, home)
+        both = np.empty((6, 2))
+        function('choose_branches')(
+            parameters.structure.copy(), np.concatenate([position, np.ravel(home.rotation)]),
+            legs['branch'].copy(), both)
+        angles = np.where(legs['branch'] > 0.0, both[:, 0], both[:, 1])
+        return crank_mistakes.likely_mistakes(
+            parameters, home, angles, at.levers(), crank_bodies(parameters))
+
+    def home_rule(self, parameters: Parameters, anchors: Array) -> str:
+        """Return that the rods are shorter than the gap, or far too long."""
+        gap = crank_mistakes.gap_of(parameters, anchors)
         rods = np.unique(parameters['legs.rod.length'])
         return (f'legs.rod.length: {shown(rods.tolist())} m: no level pose has rods of this length'
                 ': while the platform joints are level with the ends of the cranks, at the '
-                f'middle of their angles, they are {np.mean(gaps):.3g} m away from them')
+                f'middle of their angles, they are {gap:.3g} m away from them')
 
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
@@ -239,25 +294,27 @@ class Crank(LegKind):
         if AUTO not in wanted:
             return False
         position, rotation = home()
-        for leg, branch in enumerate(wanted):
-            if branch != AUTO:
-                continue
-            angles = _angles_at(parameters, leg, position, rotation)
-            name = parameters.joints[leg]
-            if angles is None:
-                rod = parameters['legs.rod.length'][leg]
-                raise ParameterError(
-                    f'{parameters.source}: legs.rod.length: {name}: {rod:.6g} m: does not reach '
-                    'the platform joint at home, from which geometry.crank_branch: auto follows')
-            angles = round(angles[0], 9) + 0.0, round(angles[1], 9) + 0.0  # no -3e-16
-            possible = [_is_allowed(parameters, leg, angle) for angle in angles]
-            if possible[0] == possible[1]:
-                words = 'both are possible' if possible[0] else 'neither is likely'
-                raise ParameterError(
-                    f'{parameters.source}: geometry.crank_branch: auto: {name} has an angle of '
-                    f'{angles[0]:.4g} rad at home with the branch positive, {angles[1]:.4g} rad '
-                    f'with negative: {words}: give the branch, or limits of the angle')
-            of['branch'][leg] = 1.0 if possible[0] else -1.0
+        hexapod: Any = parameters.structure.copy()
+        angles = np.empty((6, 2))
+        undecided = function('choose_branches')(
+            hexapod, np.concatenate([position, np.ravel(rotation)]),
+            np.array([_SIGNS[each] for each in wanted]), angles)
+        missing = np.isnan(angles[:, 0]) & [each == AUTO for each in wanted]
+        if missing.any():
+            leg = int(np.argmax(missing))
+            raise ParameterError(
+                f'{parameters.source}: legs.rod.length: {parameters.joints[leg]}: '
+                f'{parameters["legs.rod.length"][leg]:.6g} m: does not reach the platform joint '
+                'at home, from which geometry.crank_branch: auto follows')
+        if undecided:
+            both, leg = divmod(undecided - 1, 6)
+            up, down = (angles[leg].round(9) + 0.0).tolist()  # no -3e-16
+            words = 'both are possible' if both else 'neither is likely'
+            raise ParameterError(
+                f'{parameters.source}: geometry.crank_branch: auto: {parameters.joints[leg]} has '
+                f'an angle of {up:.4g} rad at home with the branch positive, {down:.4g} rad with '
+                f'negative: {words}: give the branch, or limits of the angle')
+        of['branch'] = hexapod['legs']['branch']
         return True
 
     def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
@@ -407,12 +464,6 @@ def crank_bodies(parameters: Parameters) -> tuple[Array, Array]:
     return centers, inertias
 
 
-def _unit(vectors: Array) -> Array:
-    with np.errstate(all='ignore'):
-        units: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return units
-
-
 def crank_ends(parameters: Parameters, angles: Array) -> Array:
     """Return the ends of the cranks (..., 6, 3) at their angles (..., 6), base frame [m]."""
     u, z = crank_axes(parameters)
@@ -449,40 +500,13 @@ def _complete_axes(parameters: Parameters, source: str) -> None:
                 raise ParameterError(f'{source}: {name}: {parameters.joints[leg]}: '
                                      f'{given[leg].tolist()}: a direction must not be 0, 0, 0')
         return
-    cosine, sine, level = np.cos(headings), np.sin(headings), np.zeros(6)
-    found = {AXES: np.stack([sine, -cosine, level], axis=-1),
-             DIRECTIONS: np.stack([cosine, sine, level], axis=-1)}
+    found = {AXES: np.empty((6, 3)), DIRECTIONS: np.empty((6, 3))}
+    function('level_cranks')(headings, *found.values())
     for name, value in found.items():
         if parameters[name] is not None and not np.array_equal(parameters[name], value):
             raise ParameterError(f'{source}: {name}: given as well as {HEADINGS}: leave out one '
                                  'of them')
         parameters._complete(name, value)
-
-
-def _angles_at(parameters: Parameters, leg: int, position: Array, rotation: Array,
-               ) -> tuple[float, float] | None:
-    """Return the angles of a crank with both branches in a pose [rad]; None: out of reach."""
-    u, z = (axes[leg] for axes in crank_axes(parameters))
-    line = position + rotation @ parameters.geometry.platform_joints[leg] - (
-        parameters.geometry.base_joints[leg])
-    size, rod = parameters['legs.crank.length'][leg], parameters['legs.rod.length'][leg]
-    x, y = float(line @ z), float(line @ np.cross(u, z))
-    g = (float(line @ line) + size * size - rod * rod) / (2.0 * size)
-    square = x * x + y * y - g * g
-    if not square >= 0.0:
-        return None
-    h = math.sqrt(square)
-    return math.atan2(y * g - x * h, x * g + y * h), math.atan2(y * g + x * h, x * g - y * h)
-
-
-def _is_allowed(parameters: Parameters, leg: int, angle: float) -> bool:
-    """Return whether an angle at home is within the limits, and likely."""
-    low, high = parameters.limits.angle_min, parameters.limits.angle_max
-    lowest = -_UPRIGHT if low is None else float(low[leg])
-    highest = _UPRIGHT if high is None else float(high[leg])
-    middle = 0.5 * (lowest + highest)
-    turned = middle + math.remainder(angle - middle, 2.0 * math.pi)
-    return lowest <= turned <= highest
 
 
 CRANK = Crank()

@@ -12,7 +12,7 @@ called, and which parameters belong to them.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
@@ -55,6 +55,18 @@ class LegMass(NamedTuple):
     unit: str
 
 
+class StopLoads(NamedTuple):
+    """What the drives of a hexapod carry, for its end stops and the steps that these need."""
+
+    inertia: Array  # of the drives alone, at least (6,) [kg] or [kg m^2]
+    carried: float  # mass of the parts that move with the platform joints [kg]
+    levers: tuple[Array, Array]  # smallest and largest effort by the push on a joint (6,)
+    # Largest stiffness of all stops of a leg, by the stiffness of one: at the drive (6,), and at
+    # the platform joint [1/m^2].
+    at_drives: Array
+    at_joints: Array
+
+
 class Solid(NamedTuple):
     """A cylinder of each leg, as pictures show it."""
 
@@ -68,6 +80,16 @@ class Placed(NamedTuple):
     centers: Array  # (6, 3) [m]
     directions: Array  # unit vectors (6, 3)
     lengths: Array  # (6,) [m]
+
+
+class AtHome(NamedTuple):
+    """A hexapod at rest in its home pose."""
+
+    position: Array  # (3,) [m]
+    rotation: Array  # (3, 3)
+    up: Array  # unit vector from the base to the platform (3,)
+    anchors: Array  # of the lines of force, the drives at the middle of their limits (6, 3) [m]
+    efforts: Array | None  # of the drives, for the weight of the platform (6,); None: not known
 
 
 class LegKind(ABC):
@@ -94,6 +116,10 @@ class LegKind(ABC):
         Key of the force along the line in tables, and its limit.
     commands : str
         Field of ``stewart_output`` with the efforts to command.
+    simulated : str
+        Value of the simulator's parameter ``commands`` for these efforts.
+    resolved : str
+        What a step of the simulator may not do, besides turning the platform by a number.
     width : int
         Numbers in a row of results: those of ``stewart_result`` up to the last of this kind.
     wrong_units : tuple
@@ -143,27 +169,31 @@ class LegKind(ABC):
     joint_force: str = 'joint_force'
     joint_force_limit: str
     commands: str
+    simulated: str
+    resolved: str
     width: int = _RESULT['joint_forces'].stop
     right_sign: str
     gear: str
     ratio: str = ''
     wrong_units: tuple[tuple[float, str], ...]
     own: tuple[str, ...]
-    foreign: tuple[str, ...]  # the ``own`` of other kinds
+    foreign: tuple[str, ...]  # the ``own`` of other kinds, without those of this one
     fields: Mapping[str, str]
     masses: tuple[LegMass, ...]
     massless: Mapping[str, Any]
     solids: tuple[Solid, ...]
+    alternatives: tuple[tuple[str, ...], ...] = ()  # parameters, or others in their place
+    units: Mapping[str, str] = {}  # of parameters, other than in the table
+    defaults: Mapping[str, Any] = {}  # the same
     parts: tuple[str, str]
     joints: tuple[str, str]
     elements: tuple[str, ...]
     shortened: tuple[str, ...] = ()
     zero: str = ''
     likely: Mapping[str, Any] = {}
-    alternatives: tuple[tuple[str, ...], ...] = ()  # parameters, or others in their place
-    units: Mapping[str, str] = {}  # of parameters, other than in the table
-    defaults: Mapping[str, Any] = {}  # the same
     inertia_unit: str  # of the reflected inertia of a drive
+    reflected: str  # what it is, in a formula
+    rotors: str  # and of which parts
     friction_units: tuple[str, str]  # viscous and Coulomb
 
     @property
@@ -264,9 +294,37 @@ class LegKind(ABC):
         (..., 3): angular velocity and acceleration of the base.
         """
 
+    def reach(self, parameters: Parameters) -> Array:
+        """Return the movement of a platform joint by that of its drive, at the best (6,)."""
+        del parameters
+        return np.ones(6)
+
+    def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[str]:
+        """
+        Yield likely mistakes in lengths, from which others would follow, each in one line.
+
+        anchors (6, 3): see AtHome.
+        """
+        del parameters, anchors
+        return iter(())
+
+    def likely_mistakes(self, parameters: Parameters, home: AtHome) -> Iterator[str]:
+        """Yield likely mistakes in other parameters of this kind alone, each in one line."""
+        del parameters, home
+        return iter(())
+
     @abstractmethod
-    def home_rule(self, parameters: Parameters) -> str:
-        """Return which rule parameters break that give no home pose."""
+    def stop_loads(self, parameters: Parameters) -> StopLoads:
+        """Return what the drives carry where they meet their end stops."""
+
+    @abstractmethod
+    def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
+                      ratios: Sequence[float]) -> str:
+        """Return the leg that is nearest to a motion without a solution, in words."""
+
+    @abstractmethod
+    def home_rule(self, parameters: Parameters, anchors: Array) -> str:
+        """Return which rule parameters break that give no home pose; anchors: see AtHome."""
 
     def choose_branch(self, legs: Records, parameters: Parameters,
                       home: Callable[[], tuple[Array, Array]]) -> bool:
@@ -340,14 +398,14 @@ def check_foreign(parameters: Parameters, kind: LegKind, kinds: Sequence[LegKind
                   source: str) -> None:
     """Raise ParameterError for a parameter that has a meaning for other kinds alone."""
     for name, value in parameters.given.items():
-        owner = next((each for each in kinds if each is not kind and name.startswith(each.own)),
-                     None)
         default = parameters.table[name].default
         # A whole set of parameters, as dict(parameters), gives the defaults, too.
-        if owner is None or np.size(default) > 0 and np.all(value == np.asarray(default)):
+        if not name.startswith(kind.foreign) or np.size(default) > 0 and np.all(
+                value == np.asarray(default)):
             continue
         unit = parameters.table[name].unit
         words = f'{source}: {name}: {shown(value)}{f" {unit}" if unit else ""}'
         if kind.marker:
             raise ParameterError(f'{words}: must not be given with {kind.marker}')
+        owner = next(each for each in kinds if each is not kind and name.startswith(each.own))
         raise ParameterError(f'{words}: needs {owner.marker}, which is not set')

@@ -41,6 +41,14 @@ class Lines(NamedTuple):
         return speeds, speeds * self.path.tangents
 
 
+def lines_from(anchors: Array, joints: Array, position: Array, rotation: Array) -> Lines:
+    """Return the lines from anchors to platform joints, both (6, 3), in poses (...)."""
+    arms = joint_arms(rotation, joints)
+    vectors = position[..., None, :] + arms - anchors
+    lengths = np.linalg.norm(vectors, axis=-1)
+    return Lines(lengths, vectors / lengths[..., None], arms)
+
+
 def joint_arms(rotation: Array, joints: Array) -> Array:
     """Return the arms a_i = R p_i (..., 6, 3) of platform joints (6, 3) [m]."""
     arms: Array = np.einsum('...jk,ik->...ij', rotation, joints)

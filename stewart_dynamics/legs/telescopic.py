@@ -12,15 +12,16 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.legs import telescopic_tree as tree
-from stewart_dynamics.legs.kind import LegKind, LegMass, Named, Placed, Solid, STANDARD_G
-from stewart_dynamics.legs.lines import joint_arms, Lines, per_leg, skew, transposed
+from stewart_dynamics.legs.kind import (
+    LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
+from stewart_dynamics.legs.lines import Lines, lines_from, per_leg, skew, transposed
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, SLIDE, UNIVERSAL
 from stewart_dynamics.legs.tree import BARREL, LegBranch, ROD
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
-_OF_LENGTH = 0.5  # of the cylinder in pictures, of the leg's length without a shortest one
+_OF_LENGTH = 0.5  # length of a cylinder in pictures by its leg, where that has no limit
 
 
 class Telescopic(LegKind):
@@ -35,6 +36,8 @@ class Telescopic(LegKind):
     rate_limit, effort_limit = 'limits.velocity_max', 'limits.force_max'
     joint_force_limit = 'limits.joint_force_max'
     commands = 'forces'
+    simulated = 'force'
+    resolved = 'a joint moves by more than that part of its leg'
     ratio, gear, right_sign = 'actuator.screw_lead', 'screw', '+ must push'
     wrong_units = ((1e-3, 'kN in place of N'), (1.0 / STANDARD_G, 'kgf in place of N'),
                    (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
@@ -43,7 +46,8 @@ class Telescopic(LegKind):
            'geometry.platform_outline', 'limits.length_', 'limits.velocity_max',
            'limits.force_max', 'limits.joint_force_max', 'limits.base_joint_angle_max',
            'limits.leg_clearance_min', 'drive.screw_', 'drive.base_universal_axes',
-           'drive.platform_universal_axes', 'meshes.cylinder', 'meshes.piston')
+           'drive.platform_universal_axes', 'meshes.cylinder', 'meshes.piston',
+           'noise.length', 'noise.rate', 'noise.force')
     fields = {
         'zero_length': 'geometry.zero_length', 'cylinder_mass': 'legs.cylinder.mass',
         'cylinder_center_of_mass': 'legs.cylinder.center_of_mass',
@@ -67,6 +71,7 @@ class Telescopic(LegKind):
                     for each in ('mass', 'center_of_mass', 'inertia')))
     zero = 'geometry.zero_length'
     inertia_unit = 'kg'
+    reflected, rotors = 'J (2 pi / lead)^2', 'rotor and screw'
     friction_units = 'N s/m', 'N'
 
     def write_fields(self, legs: Records, parameters: Parameters) -> None:
@@ -94,10 +99,8 @@ class Telescopic(LegKind):
 
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the legs: (1), (2)."""
-        arms = joint_arms(rotation, parameters.geometry.platform_joints)
-        vectors = position[..., None, :] + arms - parameters.geometry.base_joints
-        lengths = np.linalg.norm(vectors, axis=-1)
-        return Lines(lengths, vectors / lengths[..., None], arms)
+        geometry = parameters.geometry
+        return lines_from(geometry.base_joints, geometry.platform_joints, position, rotation)
 
     def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
                      ) -> tuple[Placed, ...]:
@@ -180,6 +183,17 @@ class Telescopic(LegKind):
             - (moment * q_squared)[..., None] * at.directions)
         return on_legs
 
+    def stop_loads(self, parameters: Parameters) -> StopLoads:
+        """Return reflected masses, and the pistons, which move with the platform."""
+        ones = np.ones(6)
+        return StopLoads(parameters.actuator.reflected_mass, float(np.sum(
+            parameters.legs.piston.mass)), (ones, ones), ones, np.zeros(6))
+
+    def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
+                      ratios: Sequence[float]) -> str:
+        """Return the shortest leg."""
+        return f'shortest leg {min(positions):.3g} m'
+
     def branches(self, parameters: Parameters, position: Array, rotation: Array, mounts: Array,
                  size: float) -> list[LegBranch]:
         """Return cylinders and pistons."""
@@ -213,9 +227,9 @@ class Telescopic(LegKind):
         """Return the parameters of a leg in a file."""
         return tree.read_leg(self, chain, base, platform, said)
 
-    def home_rule(self, parameters: Parameters) -> str:
+    def home_rule(self, parameters: Parameters, anchors: Array) -> str:
         """Return that the mean length is missing, or too short."""
-        del parameters
+        del parameters, anchors
         return ('home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
                 'must give a length that the legs can have in a level pose')
 

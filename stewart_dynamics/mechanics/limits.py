@@ -113,7 +113,7 @@ _FIELDS = {LEG_FIELDS[row.field]: row.field for row in LIMIT_ROWS}
 
 
 def short_name(limit: str) -> str:
-    """Return the name of a limit without its section, as in C: length_max, crank_torque_max."""
+    """Return the name of a limit without its section, as in C: length_max."""
     return _FIELDS.get(limit, limit.rpartition('.')[2])
 
 

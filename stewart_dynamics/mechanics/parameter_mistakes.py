@@ -19,6 +19,9 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.legs.kind import AtHome
+from stewart_dynamics.legs.lines import lines_from
 from stewart_dynamics.mechanics import gravity_mistakes
 from stewart_dynamics.mechanics.drives import drive_mistakes as drives
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
@@ -26,7 +29,7 @@ from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.mechanics.kinematics import joint_angles
 from stewart_dynamics.mechanics.kinematics.home_pose import (
-    HEIGHTS, Home, home_of, is_too_long, poses_of, Shape, shape_of, turns_about)
+    HEIGHTS, Home, home_legs, home_of, is_too_long, poses_of, Shape, shape_of, turns_about)
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import typed_pose_mistake
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
@@ -71,9 +74,8 @@ _SMALLEST_REFLECTED_MASS = 1e-3
 # with its third power: small drives accelerate more.
 _SHORTEST_START = 1e-3  # [s]
 _LARGEST_ACCELERATION = 300.0  # [m/s^2]
-# Data of an actuator; where they are given its inertia is known.
-_OF_AN_ACTUATOR = ('limits.velocity_max', 'limits.force_max', 'actuator.viscous_friction',
-                   'actuator.coulomb_friction')
+# Data of an actuator, beside its limits; where they are given its inertia is known.
+_FRICTION = 'actuator.viscous_friction', 'actuator.coulomb_friction'
 
 # The shortest leg divided by the longest: 0.5 to 1, with telescopic actuators 0.2; 0 for strokes.
 _SMALLEST_LENGTH_RATIO = 0.05
@@ -124,23 +126,30 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
         shape = shape_of(parameters)
         if one_point := _base_at_one_point(parameters, shape):
             return (one_point,)  # all others would follow from it
+        if wrong := tuple(parameters.leg_kind.wrong_sizes(
+                parameters, home_legs(parameters)['base'])):
+            return wrong  # likewise
         sizes = [*_sizes(parameters, shape)]
         found = [*sizes, *_inertia(parameters, shape),
                  *_reflected_mass(parameters, shape), *drives.likely_mistakes(parameters),
                  *_others(parameters, shape), *_clearance(parameters)]
         if geometry:
             home = home_of(parameters)
+            if not _is_assembled(parameters, home):
+                return tuple(found)  # a StewartPlatform is not made of it
             found += _legs(parameters, home, bool(sizes))
             if not sizes:
                 found += _frames(parameters, home)
                 found += _torques_at_home(parameters, home)
                 found += _small_angles(parameters, home)
             odd = tuple(_symmetry(parameters))
+            of_kind = () if sizes or odd else tuple(_of_kind(parameters, home))
+            found += of_kind
             if len(odd) == 1:
                 found += odd
             elif not sizes:  # else what follows from a wrong unit
-                found += (tuple(_singular(parameters, home)) or odd
-                          or _order(parameters, home))
+                found += (tuple(_singular(parameters, home)) or odd or not of_kind
+                          and tuple(_order(parameters, home)) or ())
                 found += joint_angles.likely_mistakes(parameters)
     return tuple(found)
 
@@ -333,20 +342,50 @@ def _torques_at_home(p: Parameters, home: Home) -> Iterator[str]:
         return
     if any(each.startswith('drive.torque_max') for each in drives.likely_mistakes(p)):
         return
-    positions, rotations = home.positions, home.rotations
-    jacobian = lagrange.inverse_jacobian(
-        lagrange.unchecked_legs(p, positions[:1], rotations[:1]))[0]
-    weight = p.carried.mass * p.gravity
-    load = np.concatenate([weight, np.cross(rotations[0] @ p.carried.center, weight)])
-    if np.linalg.cond(jacobian) > UNSOLVABLE_CONDITION:
+    efforts = _efforts_at_home(p, home)
+    if efforts is None:
         return
-    torques = (np.abs(np.linalg.solve(jacobian.T, load)) / motor_ratio(p)
-               / p.drive.efficiency)
+    torques = np.abs(efforts) / motor_ratio(p) / p.drive.efficiency
     at = int(np.argmax(torques / most))
     if torques[at] > most[at]:
         yield (f'drive.torque_max: {most[at]:.3g} N m: {p.joints[at]} needs '
                f'{torques[at]:.3g} N m to hold the platform at rest at home: at another shaft, or '
                'in another unit?')
+
+
+def _efforts_at_home(p: Parameters, home: Home) -> Array | None:
+    """Return the efforts of the drives (6,) for the weight of the platform; None: not known."""
+    positions, rotations = home.positions, home.rotations
+    jacobian = lagrange.drive_jacobian(
+        lagrange.unchecked_legs(p, positions[:1], rotations[:1]), rotations[:1])[0]
+    weight = p.carried.mass * p.gravity
+    load = np.concatenate([weight, np.cross(rotations[0] @ p.carried.center, weight)])
+    if not np.isfinite(jacobian).all() or np.linalg.cond(jacobian) > UNSOLVABLE_CONDITION:
+        return None
+    efforts: Array = np.linalg.solve(jacobian.T, load)
+    return efforts
+
+
+def _is_assembled(p: Parameters, home: Home) -> bool:
+    """Return whether home decides the assembly of the legs, where the parameters do not."""
+    positions, rotations = home.positions, home.rotations
+    try:
+        p.choose_branch(lambda: (positions[0], rotations[0]))
+    except ParameterError:
+        return False
+    return True
+
+
+def _of_kind(p: Parameters, home: Home) -> Iterator[str]:
+    """Yield mistakes in parameters that the kind of legs has alone."""
+    if home.length is None:
+        return
+    positions, rotations = home.positions, home.rotations
+    known = p.base.source != BY_IMU and (
+        gravity_mistakes.likely_mistake(p.gravity) != gravity_mistakes.IN_MM)
+    yield from p.leg_kind.likely_mistakes(p, AtHome(
+        positions[0], rotations[0], home.shape.axes[2] * home.side, home_legs(p)['base'],
+        _efforts_at_home(p, home) if known else None))
 
 
 def _small_angles(p: Parameters, home: Home) -> Iterator[str]:
@@ -363,33 +402,37 @@ def _small_angles(p: Parameters, home: Home) -> Iterator[str]:
 
 
 def _reflected_mass(p: Parameters, shape: Shape) -> Iterator[str]:
-    name = 'actuator.reflected_mass'
+    kind = p.leg_kind
+    name = kind.fields['reflected_mass']
+    formula, unit = kind.reflected, kind.inertia_unit
     if name not in p.given and not any(each in p.given for each in DRIVE_INERTIAS):
-        given = [each for each in _OF_AN_ACTUATOR if each in p.given]
+        given = [each for each in (kind.rate_limit, kind.effort_limit, *_FRICTION)
+                 if each in p.given]
         if given:
-            yield (f'{name}: missing, but {given[0]} is given: it is J (2 pi / lead)^2 of '
-                   'rotor and screw; write 0.0 for a drive that has none')
+            yield (f'{name}: missing, but {given[0]} is given: it is {formula} of '
+                   f'{kind.rotors}; write 0.0 for a drive that has none')
         return
+    reach = kind.reach(p)
     carried = (p.carried.mass + np.sum(p.legs.piston.mass)) / 6.0
-    masses = p.actuator.reflected_mass
-    least = float(np.min(masses))
-    if 0.0 < least < _SMALLEST_REFLECTED_MASS * carried:
-        yield (f'{name}: {least:.3g} kg, but each leg carries {carried:.3g} kg: the inertia of '
-               'the rotor? It is J (2 pi / lead)^2')
+    masses = p[name]
+    least, moved = float(np.min(masses)), carried * float(np.min(reach)) ** 2
+    if 0.0 < least < _SMALLEST_REFLECTED_MASS * moved:
+        yield (f'{name}: {least:.3g} {unit}, but each leg carries {moved:.3g} {unit}: the inertia '
+               f'of the rotor? It is {formula}')
         return
-    force, rate = p.limits.force_max, p.limits.velocity_max
+    force, rate = p[kind.effort_limit], p[kind.rate_limit]
     if least == 0.0 or force is None:
         return
     if p.drives and p.drive.torque_max is not None:
         force = np.minimum(force, motor_ratio(p) * p.drive.torque_max)
-    acceleration = force / masses
+    acceleration = reach * force / masses
     at = int(np.argmax(acceleration))
-    start = 0.0 if rate is None else rate[at] / acceleration[at]
+    start = 0.0 if rate is None else reach[at] * rate[at] / acceleration[at]
     size = min(shape.radius, 1.0)
     if acceleration[at] > _LARGEST_ACCELERATION / size and start < _SHORTEST_START * size:
-        yield (f'{name}: {masses[at]:.3g} kg: limits.force_max alone would accelerate it by '
-               f'{acceleration[at]:.3g} m/s^2, more than any motor: the inertia of the rotor in '
-               'kg cm^2? It is J (2 pi / lead)^2 in kg')
+        yield (f'{name}: {masses[at]:.3g} {unit}: {kind.effort_limit} alone would accelerate it '
+               f'by {acceleration[at]:.3g} m/s^2, more than any motor: the inertia of the rotor '
+               f'in kg cm^2? It is {formula} in {unit}')
 
 
 def _others(p: Parameters, shape: Shape) -> Iterator[str]:
@@ -514,7 +557,9 @@ def _legs(p: Parameters, home: Home, wrong_size: bool) -> Iterator[str]:
 def _order(p: Parameters, home: Home) -> Iterator[str]:
     """Yield that other pairs of joints give shorter legs at home, as in all hexapods known."""
     turned = home.shape.platform @ home.turns[0].T
-    squares = ((home.shape.base[:, None, :2] - turned[:, :2]) ** 2).sum(axis=-1)
+    base = p.geometry.base_joints
+    base = (base - base.mean(axis=0)) @ home.shape.axes.T
+    squares = ((base[:, None, :2] - turned[:, :2]) ** 2).sum(axis=-1)
     orders = np.array(list(permutations(range(6))))
     sums = squares[np.arange(6), orders].sum(axis=1)
     best = int(np.argmin(sums))
@@ -564,7 +609,8 @@ def _conditions(p: Parameters, shape: Shape, heights: Array, rotations: Array) -
     positions, rotations = poses_of(p, shape, heights, rotations)
     if not np.isfinite(positions).all():
         return np.full(len(heights), 1.0)
-    matrices = lagrange.inverse_jacobian(lagrange.unchecked_legs(p, positions, rotations))
+    matrices = lagrange.inverse_jacobian(lines_from(
+        home_legs(p)['base'], p.geometry.platform_joints, positions, rotations))
     length = p.singularity.characteristic_length
     if is_too_long(p, 'singularity.characteristic_length', shape):
         length = shape.platform_radius  # reported already, and not a mistake of the geometry

@@ -19,6 +19,7 @@ from stewart_dynamics.mechanics import batch, stiffness
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, optional_array, place, wrong_type)
 from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL, MOTORS, Motors
+from stewart_dynamics.mechanics.drives.servos import servo_pulses
 from stewart_dynamics.mechanics.drives.turning_screws import screw_constants
 from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, lagrange, regressor
 from stewart_dynamics.mechanics.dynamics.force_breakdown import (
@@ -321,6 +322,23 @@ class StewartPlatform:
         batch.find_unreachable(self.structure, self.parameters.joints, rows,
                                positions.reshape(-1, 6), pose.shape)
         return check_finite(f'leg {self._kind.position.field}', positions, len(pose.shape))
+
+    def servo_pulses(self, positions: ArrayLike) -> Array:
+        """
+        Return the pulse widths (..., 6) [s] of servos at positions of the drives (..., 6) [rad].
+
+        Positions are those of ``inverse_kinematics``, pulses never outside ``servo.pulse_min``
+        and ``servo.pulse_max``.
+
+        Raises
+        ------
+        ParameterError
+            ``servo.angle_at_min`` and ``servo.angle_at_max`` are not set.
+        MotionError
+            A position is not between them: names sample and leg.
+
+        """
+        return servo_pulses(self.parameters, positions)
 
     def forward_kinematics(self, lengths: ArrayLike, guess: Pose | Motion | None = None) -> Pose:
         """

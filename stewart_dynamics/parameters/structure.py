@@ -18,16 +18,18 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import (
-    function, LIMIT_ROWS, LimitRow, record, Rule, RULES)
+    function, KINDS, LIMIT_ROWS, LimitRow, record, Rule, RULES)
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
 
 def limit_name(row: LimitRow) -> str:
-    """Return the parameter of a limit of the legs; those of cranks have other names in C."""
-    group = 'drive' if row.depends == 'MOTOR' else 'limits'
-    return f'{group}.{row.field.removeprefix("crank_")}'
+    """Return the parameter of a limit of the legs; in C its name may begin with a kind of legs."""
+    group, name = 'drive' if row.depends == 'MOTOR' else 'limits', row.field
+    for kind in KINDS:
+        name = name.removeprefix(f'{kind.lower()}_')
+    return f'{group}.{name}'
 
 
 LEG_FIELDS: Mapping[str, str] = {
@@ -59,7 +61,7 @@ _IF_NOT_SET = {**{LEG_FIELDS[row.field]: -math.inf if row.minimum else math.inf
                   for row in LIMIT_ROWS},
                'limits.length_min': 0.0, 'limits.lever_min': 0.0,
                'limits.leg_clearance_min': -math.inf, 'actuator.screw_lead': 0.0,
-               'singularity.characteristic_length': 0.0, 'legs.crank.length': 0.0}
+               'singularity.characteristic_length': 0.0}
 
 
 MOST_POINTS = 32

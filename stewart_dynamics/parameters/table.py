@@ -41,6 +41,7 @@ ONE_POINT = CONSTANTS['ONE_POINT']
 NO_MASS = 1e-15
 """Mass of a platform in a cube on its radius that stands for none: forces are zero [kg/m^3]."""
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)  # [m/s^2]
+_LONGEST_PULSE = 0.02  # of servos: they take 50 pulses a second [s]
 _HYSTERESIS = CONSTANTS['HYSTERESIS']
 
 
@@ -361,6 +362,23 @@ _LENGTHS: dict[str, Any] = {
     'title': 'Leg lengths', 'note': 'between the joint centers', 'usual': True}
 
 
+class ServoGroup(ParameterGroup):
+    """Hobby servos: two points of each, whose pulse and angle were measured."""
+
+    pulse_min: Array = _legs(
+        'shortest pulse of a servo, never shorter', 's', (0.0005,), minimum=0.0,
+        maximum=_LONGEST_PULSE)
+    pulse_max: Array = _legs(
+        'longest pulse of a servo, never longer', 's', (0.0025,), minimum=0.0, above=True,
+        maximum=_LONGEST_PULSE)
+    angle_at_min: Array | None = _legs(
+        'angle of the crank at servo.pulse_min, measured: an offset, and a servo that turns the '
+        'other way, are in it', 'rad', (), minimum=-2.0 * math.pi, maximum=2.0 * math.pi)
+    angle_at_max: Array | None = _legs(
+        'angle of the crank at servo.pulse_max, measured', 'rad', (), minimum=-2.0 * math.pi,
+        maximum=2.0 * math.pi)
+
+
 class LimitsGroup(ParameterGroup):
     """Limits of legs and joints."""
 
@@ -657,6 +675,7 @@ class Parameters(ParameterSet):
     legs: LegsGroup
     actuator: ActuatorGroup
     drive: DriveGroup
+    servo: ServoGroup
     gravity: Array = _point(
         'acceleration of free fall: base axes; axes of the world where base.source is pose or '
         'motion; not used where it is imu', 'm/s^2', STANDARD_GRAVITY)

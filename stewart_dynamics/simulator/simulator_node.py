@@ -63,7 +63,7 @@ NOT_SIX = 'not six numbers'
 
 class SimulatorNode(Node):
     """
-    Moves the hexapod under the commanded forces or torques, and publishes its state.
+    Moves the hexapod under the commanded efforts or torques, and publishes its state.
 
     Brakes hold it until the first command, and when none comes for ``command_timeout``. A base
     whose motion is generated is at rest until the first command, and then goes on.
@@ -200,7 +200,7 @@ class SimulatorNode(Node):
         self._publish()
 
     def _applied(self, state: PlantState) -> tuple[float, ...]:
-        return state.motors.torques if self._torques and state.motors else state.forces
+        return state.motors.torques if self._torques and state.motors else state.efforts
 
     def _brake(self) -> None:
         if not self._braked:
@@ -256,8 +256,9 @@ class SimulatorNode(Node):
         joint, command, value = max(
             zip(self._settings.joints, commands, applied, strict=True),
             key=lambda leg: abs(leg[1] - leg[2]))
+        kind = self._settings.leg_kind
         unit, limit = (('N m', 'drive.torque_max or drive.torque_speed') if self._torques
-                       else ('N', 'limits.force_max'))
+                       else (kind.effort.unit, kind.effort_limit))
         self._say('saturated', f'commands: {joint}: {command:.6g} {unit} exceeds {limit}, '
                   f'clipped to {value:.6g} {unit}')
 

@@ -14,21 +14,24 @@ from types import MappingProxyType
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.limits import FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_LEGS
+from stewart_dynamics.legs import KINDS
+from stewart_dynamics.mechanics.limits import LEVER_MIN, LIMITS
 from stewart_dynamics.parameters.parameter_set import declare, ParameterGroup
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
 _POSE = 'X Y Z alpha beta gamma'
 
-FORCE, TORQUE = 'force', 'torque'  # values of commands
+TORQUE = 'torque'  # of the motors; the other values of commands are efforts of kinds of legs
+COMMANDS = (*(kind.simulated for kind in KINDS), TORQUE)
 
 
 class EndStopsGroup(ParameterGroup):
     """End stops of the legs."""
 
     frequency: float = declare(
-        'natural frequency of the mass of a leg on its end stop: its reflected mass and a sixth '
-        'of platform and pistons', 'Hz', 30.0, minimum=0.0, above=True)
+        'natural frequency of a drive on its end stop, with its reflected mass or inertia, and a '
+        'sixth of the platform and of the parts that move with it, at the largest lever', 'Hz',
+        30.0, minimum=0.0, above=True)
     damping_ratio: float = declare(
         'damping ratio of the same; 1: no rebound', '', 0.5, minimum=0.0)
 
@@ -42,6 +45,12 @@ class NoiseGroup(ParameterGroup):
         'standard deviation of the measured rates', 'm/s', 0.0, minimum=0.0, maximum=1e9)
     force: float = declare(
         'standard deviation of the measured forces', 'N', 0.0, minimum=0.0, maximum=1e9)
+    angle: float = declare(
+        'standard deviation of the measured angles', 'rad', 0.0, minimum=0.0, maximum=1e9)
+    speed: float = declare(
+        'standard deviation of the measured speeds', 'rad/s', 0.0, minimum=0.0, maximum=1e9)
+    torque: float = declare(
+        'standard deviation of the measured torques', 'N m', 0.0, minimum=0.0, maximum=1e9)
     seed: float = declare('seed of the noise: equal seeds give equal noise', '', 0.0)
 
 
@@ -118,6 +127,9 @@ class SimulatedImuGroup(ParameterGroup):
     bias: ImuBiasGroup
 
 
+# Limits that commands saturate at, or that have end stops.
+_OF_THE_PLANT = {LEVER_MIN, *(name for kind in KINDS for name in (
+    *kind.position_limits, kind.effort_limit))}
 # Beginnings of names.
 _OF_THE_NODE = ('autostart', 'cueing.', 'drive.resistance', 'drive.speed_max',
                 'drive.temperature_rise_max', 'drive.thermal_', 'drive.torque_constant',
@@ -125,7 +137,8 @@ _OF_THE_NODE = ('autostart', 'cueing.', 'drive.resistance', 'drive.speed_max',
                 'geometry.platform_joint_axes', 'joint_states.', 'legs.cylinder.length',
                 'legs.cylinder.radius',
                 'legs.piston.radius', 'meshes.', *(
-                    name for name in OF_LEGS if name not in (LENGTH_MIN, LENGTH_MAX, FORCE_MAX)),
+                    name for name in LIMITS if name.startswith('limits.')
+                    and name not in _OF_THE_PLANT),
                 'platform_frame', 'publish_tf', 'setpoint.', 'singularity.', 'trajectory.',
                 'visualization_rate')
 
@@ -147,8 +160,9 @@ class SimulatorParameters(Parameters):
         'with the next command; if not set, the last command is held', 's', minimum=0.0,
         maximum=1e6, above=True)
     commands: str = declare(
-        'quantity on ~/commands: forces of the legs [N], or torques of the motors [N m], with '
-        'drive.*', '', FORCE, choices=(FORCE, TORQUE))
+        'quantity on ~/commands: forces of the legs [N] or, where legs are turned, their torques '
+        '[N m], leg_torque by default; or torques of the motors [N m], with drive.*', '',
+        COMMANDS[0], choices=COMMANDS)
     end_stops: EndStopsGroup
     noise: NoiseGroup
     base_motion: BaseMotionGroup
@@ -160,6 +174,12 @@ class SimulatorParameters(Parameters):
     def _check_together(self, source: str) -> None:
         """Check what one parameter demands of another."""
         super()._check_together(source)
+        kind = self.leg_kind
+        if 'commands' not in self.given:
+            self._complete('commands', kind.simulated)
+        if self.commands not in (kind.simulated, TORQUE):
+            raise ParameterError(f'{source}: commands: {self.commands}: must be {kind.simulated} '
+                                 f'or {TORQUE}: the drives of the legs have a {kind.effort.name}')
         if self.commands == TORQUE:
             if not self.drives:
                 raise ParameterError(f'{source}: commands: {TORQUE}: needs drive.*')
@@ -167,7 +187,8 @@ class SimulatorParameters(Parameters):
             if least <= 0.0:
                 raise ParameterError(
                     f'{source}: commands: {TORQUE}: drive.back_driving_efficiency {least:.3g}: '
-                    'a self-locking screw can be simulated with commanded forces only')
+                    f'a self-locking {kind.gear} can be simulated with commanded '
+                    f'{kind.effort.field} only')
         steps = 1.0 / (self.rate * self.step)
         if not _is_whole(steps):
             raise ParameterError(

@@ -50,7 +50,7 @@ class StateMessages:
     def write(self, stamp: int, state: PlantState) -> Iterator[tuple[str, bytes]]:
         """Yield topics and messages of a state at a time [ns]."""
         yield LEG_STATES, self._joint_state.write(
-            stamp, map(sub, state.lengths, self._zero_lengths), state.rates, state.forces)
+            stamp, map(sub, state.positions, self._zero_lengths), state.rates, state.efforts)
         if state.motors and self._motors is not None:
             yield MOTOR_STATES, self._motors.write(stamp, *state.motors)
         yield 'pose', self._pose.write(stamp, state.pose)

@@ -29,8 +29,19 @@ void keep_windings(const stewart_state & from, stewart_state & to)
 }
 
 constexpr char kUnknownBase[] = "the motion of the base is not known";
-constexpr char kTooFar[] =
-  "farther from the last command than limits.velocity_max allows in setpoint.timeout";
+
+/// Why a command of a drive's position is rejected, by the kind of legs.
+struct PositionRules
+{
+  const char * below, * above, * too_far;
+};
+
+constexpr PositionRules kLengths{
+  "shorter than limits.length_min", "longer than limits.length_max",
+  "farther from the last command than limits.velocity_max allows in setpoint.timeout"};
+constexpr PositionRules kAngles{
+  "below limits.angle_min", "above limits.angle_max",
+  "farther from the last command than limits.speed_max allows in setpoint.timeout"};
 
 const char * text_of(int code)
 {
@@ -39,6 +50,7 @@ const char * text_of(int code)
     case STEWART_NOT_UNIT: return "the orientation is not a unit quaternion";
     case STEWART_SINGULAR: return "det(J) is zero";
     case STEWART_SUPPRESSED: return "suppressed by singularity.action or limits.action";
+    case STEWART_UNREACHABLE: return "a leg does not reach the platform";
     case STEWART_NO_POSE: return "the legs' positions belong to no pose near the last one";
     default: return "a reference is out of range";
   }
@@ -143,7 +155,7 @@ int FeedForward::answer(
   if (rejection_ || is_gap(updated_at_, now)) {
     catch_up();
   }
-  // Steps are judged by check_lengths: cycles repeat references that come more rarely.
+  // Steps are judged by check_positions: cycles repeat references that come more rarely.
   std::fill_n(state_.lengths, 6, std::numeric_limits<double>::quiet_NaN());
   const stewart_state before = state_;
   const std::int64_t followed_at = followed_at_;
@@ -244,14 +256,14 @@ int FeedForward::motion_of(const PlatformReference & reference, stewart_motion &
 /// The pose by forward kinematics from the last one.
 int FeedForward::motion_of(const LegReference & reference, stewart_motion & motion) const
 {
-  Six lengths;
+  Six positions;  // of the drives: lengths or angles
   for (std::size_t n = 0; n < 6; ++n) {
-    lengths[n] = reference.positions[n] + hexapod_.legs[n].zero_length;
+    positions[n] = reference.positions[n] + hexapod_.legs[n].zero_length;
   }
   stewart_pose pose;
   std::copy_n(held_.position, 3, pose.position);
   std::copy_n(held_.rotation, 9, pose.rotation);
-  const int code = stewart_forward_kinematics(&hexapod_, lengths.data(), &pose);
+  const int code = stewart_forward_kinematics(&hexapod_, positions.data(), &pose);
   if (code != STEWART_OK) {
     return code;
   }
@@ -272,27 +284,27 @@ int FeedForward::follow(
   if (code != STEWART_OK) {
     return reject(code, text_of(code));
   }
-  code = check_lengths();
+  put_drives(&hexapod_, &output_, &drives_);
+  code = check_positions();
   if (code != STEWART_OK) {
     return code;
   }
-  code = put_loads(motion, output_, feedback, command);
+  code = put_loads(motion, drives_, feedback, command);
   if (code != STEWART_OK) {
     return reject(code, text_of(code));
   }
   bool reached = true;
   for (std::size_t n = 0; n < 6; ++n) {
-    const stewart_leg & leg = hexapod_.legs[n];
-    const double rate = output_.result.rates[n];
-    double length = output_.result.lengths[n];
+    const double most = drives_.rate_max[n];
+    double position = drives_.positions[n];
     if (started_ && catching_up_) {
-      const double step = leg.velocity_max * (1e-9 * static_cast<double>(period_));
-      length = std::clamp(length, held_lengths_[n] - step, held_lengths_[n] + step);
-      reached = reached && length == output_.result.lengths[n];
+      const double step = most * (1e-9 * static_cast<double>(period_));
+      position = std::clamp(position, held_positions_[n] - step, held_positions_[n] + step);
+      reached = reached && position == drives_.positions[n];
     }
-    command.positions[n] = length - leg.zero_length;
-    command.velocities[n] = std::clamp(rate, -leg.velocity_max, leg.velocity_max);
-    held_lengths_[n] = length;
+    command.positions[n] = position - hexapod_.legs[n].zero_length;
+    command.velocities[n] = std::clamp(drives_.rates[n], -most, most);
+    held_positions_[n] = position;
   }
   catching_up_ = catching_up_ && !reached;
   held_ = stewart_motion{};
@@ -308,20 +320,20 @@ int FeedForward::follow(
 
 /// Whatever limits.action says: no drive may get a position that its leg cannot have, or a step
 /// that it cannot make. References may come as rarely as the timeout allows.
-int FeedForward::check_lengths()
+int FeedForward::check_positions()
 {
+  const PositionRules & rules = hexapod_.leg_kind == STEWART_TELESCOPIC ? kLengths : kAngles;
   for (int n = 0; n < 6; ++n) {
-    const double length = output_.result.lengths[n];
-    const double farthest = hexapod_.legs[n].velocity_max * (1e-9 * static_cast<double>(timeout_));
-    if (output_.exceeded[n] & STEWART_LENGTH_MIN) {
-      return reject(STEWART_SUPPRESSED, "shorter than limits.length_min", n + 1);
+    const double farthest = drives_.rate_max[n] * (1e-9 * static_cast<double>(timeout_));
+    if (drives_.below[n] != 0.0) {
+      return reject(STEWART_SUPPRESSED, rules.below, n + 1);
     }
-    if (output_.exceeded[n] & STEWART_LENGTH_MAX) {
-      return reject(STEWART_SUPPRESSED, "longer than limits.length_max", n + 1);
+    if (drives_.above[n] != 0.0) {
+      return reject(STEWART_SUPPRESSED, rules.above, n + 1);
     }
-    const double step = length - held_lengths_[static_cast<std::size_t>(n)];
+    const double step = drives_.positions[n] - held_positions_[static_cast<std::size_t>(n)];
     if (started_ && std::fabs(step) > farthest) {
-      return reject(STEWART_SUPPRESSED, kTooFar, n + 1);
+      return reject(STEWART_SUPPRESSED, rules.too_far, n + 1);
     }
   }
   return STEWART_OK;
@@ -330,13 +342,13 @@ int FeedForward::check_lengths()
 /// Write efforts and motors of a motion; a torque is that of the clipped effort, with the inertia,
 /// the losses and the available torque of its drive. Written with STEWART_OK alone.
 int FeedForward::put_loads(
-  const stewart_motion & motion, const stewart_output & output, const Six & feedback,
+  const stewart_motion & motion, const drive_values & drives, const Six & feedback,
   Command & command) const
 {
   Six efforts;
   for (std::size_t n = 0; n < 6; ++n) {
-    const double most = hexapod_.legs[n].force_max;
-    efforts[n] = std::clamp(output.result.forces[n] + feedback[n], -most, most);
+    const double most = drives.effort_max[n];
+    efforts[n] = std::clamp(drives.efforts[n] + feedback[n], -most, most);
   }
   stewart_motors motors{};
   const int code = hexapod_.with_motors ?
@@ -348,7 +360,7 @@ int FeedForward::put_loads(
   for (std::size_t n = 0; n < 6; ++n) {
     const stewart_leg & leg = hexapod_.legs[n];
     const double fastest =
-      hexapod_.with_motors ? std::min(leg.speed_max, leg.velocity_max * leg.motor_ratio) : 0.0;
+      hexapod_.with_motors ? std::min(leg.speed_max, drives.rate_max[n] * leg.motor_ratio) : 0.0;
     command.torques[n] = motors.commands[n];
     command.motor_velocities[n] = std::clamp(motors.speeds[n], -fastest, fastest);
   }
@@ -360,6 +372,7 @@ void FeedForward::hold(const Six & feedback, std::int64_t now, Command & command
 {
   stewart_state state = state_;
   stewart_output at_rest;
+  drive_values drives;
   if (!started_ || stewart_step(
       &unsuppressed_, &held_, held_wrench_.data(), base(), now, &state, &at_rest) != STEWART_OK)
   {
@@ -369,10 +382,11 @@ void FeedForward::hold(const Six & feedback, std::int64_t now, Command & command
   Six added;
   for (std::size_t n = 0; n < 6; ++n) {
     added[n] = std::isfinite(feedback[n]) ? feedback[n] : 0.0;
-    command.positions[n] = held_lengths_[n] - hexapod_.legs[n].zero_length;
+    command.positions[n] = held_positions_[n] - hexapod_.legs[n].zero_length;
     command.velocities[n] = 0.0;
   }
-  put_loads(held_, at_rest, added, command);
+  put_drives(&unsuppressed_, &at_rest, &drives);
+  put_loads(held_, drives, added, command);
 }
 
 }  // namespace stewart_dynamics_controller

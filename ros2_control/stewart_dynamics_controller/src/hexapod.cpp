@@ -10,6 +10,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stewart_dynamics_controller/feed_forward.hpp"
@@ -105,6 +106,147 @@ int put_points(
   return static_cast<int>(values.size() / kSize);
 }
 
+bool has_cranks(const Params & p) {return !p.legs.crank.length.empty();}
+
+/// Return whether numbers are given: neither none nor all of them a default.
+bool is_given(const std::vector<double> & values, double default_value = kNotSet)
+{
+  return std::any_of(
+    values.begin(), values.end(), [&](double each) {return each != default_value;});
+}
+
+/// Throw where a parameter is given that has no meaning for the kind of legs.
+void check_foreign(const Params & p)
+{
+  const auto & cylinder = p.legs.cylinder;
+  const auto & piston = p.legs.piston;
+  const auto & crank = p.legs.crank;
+  const auto & rod = p.legs.rod;
+  const auto & at = p.limits;
+  const auto & g = p.geometry;
+  const std::pair<const char *, bool> of_telescopic[] = {
+    {"legs.cylinder.mass", is_given(cylinder.mass, 0.0)},
+    {"legs.cylinder.center_of_mass", is_given(cylinder.center_of_mass, 0.0)},
+    {"legs.cylinder.inertia", is_given(cylinder.inertia, 0.0)},
+    {"legs.cylinder.radius", is_given(cylinder.radius)},
+    {"legs.cylinder.length", is_given(cylinder.length)},
+    {"legs.piston.mass", is_given(piston.mass, 0.0)},
+    {"legs.piston.center_of_mass", is_given(piston.center_of_mass, 0.0)},
+    {"legs.piston.inertia", is_given(piston.inertia, 0.0)},
+    {"legs.piston.radius", is_given(piston.radius)},
+    {"actuator.reflected_mass", is_given(p.actuator.reflected_mass, 0.0)},
+    {"actuator.screw_lead", is_given(p.actuator.screw_lead)},
+    {"geometry.zero_length", is_given(g.zero_length, 0.0)},
+    {"geometry.base_joint_axes", is_given(g.base_joint_axes)},
+    {"geometry.base_outline", is_given(g.base_outline)},
+    {"geometry.platform_outline", is_given(g.platform_outline)},
+    {"limits.length_min", is_given(at.length_min)}, {"limits.length_max", is_given(at.length_max)},
+    {"limits.velocity_max", is_given(at.velocity_max)},
+    {"limits.force_max", is_given(at.force_max)},
+    {"limits.joint_force_max", is_given(at.joint_force_max)},
+    {"limits.base_joint_angle_max", is_given(at.base_joint_angle_max)},
+    {"limits.leg_clearance_min", !std::isnan(at.leg_clearance_min)},
+    {"drive.screw_inertia", is_given(p.drive.screw_inertia, 0.0)},
+    {"drive.screw_rotation", p.drive.screw_rotation != "guided"},
+    {"drive.base_universal_axes", is_given(p.drive.base_universal_axes)},
+    {"drive.platform_universal_axes", is_given(p.drive.platform_universal_axes)}};
+  const std::pair<const char *, bool> of_cranks[] = {
+    {"legs.crank.mass", is_given(crank.mass, 0.0)},
+    {"legs.crank.center_of_mass", is_given(crank.center_of_mass, 0.0)},
+    {"legs.crank.inertia", is_given(crank.inertia, 0.0)},
+    {"legs.rod.length", is_given(rod.length)}, {"legs.rod.mass", is_given(rod.mass, 0.0)},
+    {"legs.rod.center_of_mass", is_given(rod.center_of_mass)},
+    {"legs.rod.inertia", is_given(rod.inertia)},
+    {"actuator.reflected_inertia", is_given(p.actuator.reflected_inertia, 0.0)},
+    {"geometry.crank_angles", is_given(g.crank_angles)},
+    {"geometry.crank_axes", is_given(g.crank_axes)},
+    {"geometry.crank_directions", is_given(g.crank_directions)},
+    {"limits.angle_min", is_given(at.angle_min)}, {"limits.angle_max", is_given(at.angle_max)},
+    {"limits.speed_max", is_given(at.speed_max)}, {"limits.torque_max", is_given(at.torque_max)},
+    {"limits.rod_force_max", is_given(at.rod_force_max)},
+    {"limits.lever_min", is_given(at.lever_min)}};
+  if (has_cranks(p)) {
+    for (const auto & [name, given] : of_telescopic) {
+      check(!given, (std::string(name) + ": must not be given with legs.crank.length").c_str());
+    }
+    return;
+  }
+  for (const auto & [name, given] : of_cranks) {
+    check(!given, (std::string(name) + ": needs legs.crank.length, which is not set").c_str());
+  }
+}
+
+/// Write the axes of a motor and the direction of its crank at the angle zero.
+void put_crank_axes(const Params & p, std::size_t n, stewart_leg & leg)
+{
+  const auto & g = p.geometry;
+  std::vector<double> axes = g.crank_axes, directions = g.crank_directions;
+  if (!g.crank_angles.empty()) {
+    check(g.crank_angles.size() == 6, "geometry.crank_angles: must have 6 entries");
+    check(
+      axes.empty() && directions.empty(), "geometry.crank_axes, geometry.crank_directions: given "
+      "as well as geometry.crank_angles: leave out one of them");
+    axes.resize(18), directions.resize(18);
+    level_cranks(g.crank_angles.data(), axes.data(), directions.data());
+  }
+  check(
+    !axes.empty() && !directions.empty(), "geometry.crank_angles: not set: needed by "
+    "legs.crank.length; or give geometry.crank_axes and geometry.crank_directions");
+  put_row("geometry.crank_axes", axes, n, leg.crank_axis);
+  put_row("geometry.crank_directions", directions, n, leg.crank_direction);
+}
+
+/// Write one of several numbers of a crank: those of all legs, of each leg, or the one at `alone`.
+void put_numbers(
+  const char * name, const std::vector<double> & values, std::size_t n, std::size_t alone,
+  double * numbers, std::size_t count)
+{
+  if (values.size() == count || values.size() == 6 * count) {
+    const std::size_t first = values.size() == count ? 0 : count * n;
+    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(first), count, numbers);
+  } else {
+    numbers[alone] = of_leg(name, values, n);
+  }
+}
+
+void put_crank(const Params & p, std::size_t n, stewart_leg & leg)
+{
+  const auto & crank = p.legs.crank;
+  const auto & rod = p.legs.rod;
+  leg.crank_length = of_leg("legs.crank.length", crank.length, n);
+  check(!rod.length.empty(), "legs.rod.length: not set: needed by legs.crank.length");
+  leg.rod_length = of_leg("legs.rod.length", rod.length, n);
+  put_crank_axes(p, n, leg);
+  leg.crank_mass = of_leg("legs.crank.mass", crank.mass, n);
+  put_numbers(
+    "legs.crank.center_of_mass", crank.center_of_mass, n, 0, leg.crank_center_of_mass, 3);
+  put_numbers("legs.crank.inertia", crank.inertia, n, 5, leg.crank_inertia, 6);
+  leg.rod_mass = of_leg("legs.rod.mass", rod.mass, n);
+  leg.rod_center_of_mass =
+    of_leg("legs.rod.center_of_mass", rod.center_of_mass, n, kNotSet);
+  leg.rod_inertia = of_leg("legs.rod.inertia", rod.inertia, n, kNotSet);
+  leg.reflected_mass =
+    of_leg("actuator.reflected_inertia", p.actuator.reflected_inertia, n);
+  const auto & at = p.limits;
+  leg.angle_min = of_leg("limits.angle_min", at.angle_min, n, -kInfinite);
+  leg.angle_max = of_leg("limits.angle_max", at.angle_max, n, kInfinite);
+  leg.crank_speed_max = of_leg("limits.speed_max", at.speed_max, n, kInfinite);
+  leg.crank_torque_max = of_leg("limits.torque_max", at.torque_max, n, kInfinite);
+  leg.rod_force_max = of_leg("limits.rod_force_max", at.rod_force_max, n, kInfinite);
+  leg.lever_min = of_leg("limits.lever_min", at.lever_min, n, 0.1);
+  leg.branch = 1.0;
+}
+
+/// Return the branch of a leg: 1 or -1, or 0 if home decides it.
+double branch_of(const Params & p, std::size_t n)
+{
+  const auto & given = p.geometry.crank_branch;
+  check(
+    given.size() == 1 || given.size() == 6, "geometry.crank_branch: must have 1 or 6 entries");
+  const std::string & branch = given[given.size() == 1 ? 0 : n];
+  return branch == "positive" ? 1.0 : branch == "negative" ? -1.0 : 0.0;
+}
+
 stewart_leg leg_of(
   const Params & p, const std::vector<double> & base, const std::vector<double> & platform,
   std::size_t n)
@@ -112,6 +254,7 @@ stewart_leg leg_of(
   stewart_leg leg{};
   put_row("geometry.base_joints", base, n, leg.base_joint);
   put_row("geometry.platform_joints", platform, n, leg.platform_joint);
+  leg.servo_angle_at_min = leg.servo_angle_at_max = kNotSet;
   leg.zero_length = of_leg("geometry.zero_length", p.geometry.zero_length, n);
   const auto & cylinder = p.legs.cylinder;
   leg.cylinder_mass = of_leg("legs.cylinder.mass", cylinder.mass, n);
@@ -128,7 +271,7 @@ stewart_leg leg_of(
   leg.reflected_mass = of_leg("actuator.reflected_mass", actuator.reflected_mass, n);
   leg.viscous_friction = of_leg("actuator.viscous_friction", actuator.viscous_friction, n);
   leg.coulomb_friction = of_leg("actuator.coulomb_friction", actuator.coulomb_friction, n);
-  leg.coulomb_velocity = of_leg("actuator.coulomb_velocity", actuator.coulomb_velocity, n, 1e-3);
+  leg.coulomb_velocity = of_leg("actuator.coulomb_velocity", actuator.coulomb_velocity, n, has_cranks(p) ? 0.01 : 1e-3);
   leg.screw_lead = of_leg("actuator.screw_lead", actuator.screw_lead, n);
   const auto & drive = p.drive;
   leg.gear_ratio = of_leg("drive.gear_ratio", drive.gear_ratio, n, 1.0);
@@ -174,9 +317,10 @@ stewart_leg leg_of(
   STEWART_CRANK_LIMITS(MINIMUM, MAXIMUM, MAXIMUM)
 #undef MINIMUM
 #undef MAXIMUM
-  check(
-    p.legs.crank.length.empty(),
-    "legs.crank.length: stewart_dynamics_controller takes telescopic legs alone");
+  leg.lever_min = 0.0;
+  if (has_cranks(p)) {
+    put_crank(p, n, leg);
+  }
   return leg;
 }
 
@@ -202,6 +346,37 @@ home_poses homes_of(const Params & p, stewart_platform hexapod)
   put_home_legs(&hexapod, &legs);
   find_home(&legs, side == "positive" ? 1 : side == "negative" ? -1 : 0, &home);
   return home;
+}
+
+/// Give cranks the branches that are set, or those that home decides.
+void put_branches(const Params & p, stewart_platform & hexapod)
+{
+  double wanted[6], angles[12];
+  for (std::size_t n = 0; n < 6; ++n) {
+    wanted[n] = branch_of(p, n);
+    hexapod.legs[n].branch = wanted[n];
+  }
+  if (std::find(std::begin(wanted), std::end(wanted), 0.0) == std::end(wanted)) {
+    return;
+  }
+  const home_poses home = homes_of(p, hexapod);
+  check(
+    home.reachable != 0.0 && home.known != 0.0, "home pose: no level pose has all rods at the "
+    "cranks' middle angles: needed by geometry.crank_branch: auto");
+  stewart_platform complete = hexapod;
+  stewart_complete(&complete);
+  const std::int64_t open = choose_branches(&complete, &home.poses[0], wanted, angles);
+  for (std::size_t n = 0; n < 6; ++n) {
+    check(
+      wanted[n] != 0.0 || !std::isnan(angles[2 * n]), ("legs.rod.length: does not reach the "
+      "platform joint at home, from which geometry.crank_branch: auto follows: leg " +
+      std::to_string(n + 1)).c_str());
+    hexapod.legs[n].branch = complete.legs[n].branch;
+  }
+  check(
+    open == 0, (std::string("geometry.crank_branch: auto: ") + (open > 6 ?
+    "both are possible" : "neither is likely") + ": give the branch, or limits of the angle: leg " +
+    std::to_string((open + 5) % 6 + 1)).c_str());
 }
 
 /// Check that there is a home pose; needed_by: what it is needed by, for the error without one.
@@ -261,6 +436,7 @@ void check_rules(const stewart_platform & hexapod)
 
 stewart_platform hexapod_of(const Params & p)
 {
+  check_foreign(p);
   stewart_platform hexapod{};
   std::copy_n(p.gravity.begin(), 3, hexapod.gravity);
   hexapod.mass = p.platform.mass;
@@ -272,6 +448,9 @@ stewart_platform hexapod_of(const Params & p)
     "platform", g.platform_joints, g.platform_radius, g.platform_angles, g.platform_height);
   for (std::size_t n = 0; n < 6; ++n) {
     hexapod.legs[n] = leg_of(p, base, platform, n);
+  }
+  if (has_cranks(p)) {
+    put_branches(p, hexapod);
   }
   put_axes(p, hexapod);
   const double clearance = p.limits.leg_clearance_min;
@@ -305,6 +484,7 @@ std::optional<Governor> governor_of(const Params & p, const stewart_platform & h
   if (!p.governor) {
     return std::nullopt;
   }
+  check(!has_cranks(p), "governor: available for telescopic legs alone");
   check(p.reference == "platform", "governor: needs reference: platform");
   const home_poses home = homes_of(p, hexapod);
   check_home(home, "needed by governor");
@@ -358,7 +538,7 @@ Six torque_scales_of(const Params & p)
   for (const auto & interface : p.command_interfaces) {
     const bool per_mille = interface == "torque_per_mille";
     check(
-      !p.actuator.screw_lead.empty() ||
+      has_cranks(p) || !p.actuator.screw_lead.empty() ||
       !(per_mille || interface == "torque" || interface == "motor_velocity"),
       "actuator.screw_lead: not set: needed by torque, torque_per_mille and motor_velocity in "
       "command_interfaces");

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "stewart_dynamics_controller/feed_forward.hpp"
 
@@ -654,6 +655,110 @@ void test_imu()
   CHECK(feed_forward.rejection() && close(command.efforts, followed, 1e-9));
 }
 
+/// The same platform on cranks, like config/crank_platform.yaml: level motor axes, zero at home.
+stewart_platform rig()
+{
+  const double base[] = {60, 0, -60, -120, 180, 120}, top[] = {40, 20, -80, -100, 160, 140};
+  const double heading[] = {150, -90, 30, 150, -90, 30};
+  stewart_platform p = hexapod();
+  for (int n = 0; n < 6; ++n) {
+    stewart_leg & leg = p.legs[n];
+    const double before[] = {leg.viscous_friction, leg.coulomb_velocity};
+    leg = stewart_leg{};
+    leg.base_joint[0] = 0.4064 * std::cos(base[n] * kDegree);
+    leg.base_joint[1] = 0.4064 * std::sin(base[n] * kDegree);
+    leg.platform_joint[0] = 0.40005 * std::cos(top[n] * kDegree);
+    leg.platform_joint[1] = 0.40005 * std::sin(top[n] * kDegree);
+    leg.crank_direction[0] = leg.crank_axis[1] = std::cos(heading[n] * kDegree);
+    leg.crank_direction[1] = leg.crank_axis[0] = std::sin(heading[n] * kDegree);
+    leg.crank_axis[1] *= -1.0;
+    leg.crank_length = 0.18415;
+    leg.rod_length = 0.7239;
+    leg.crank_mass = 2.4;
+    leg.crank_center_of_mass[0] = 0.06;
+    leg.rod_mass = 1.3;
+    leg.rod_center_of_mass = leg.rod_inertia = kNaN;
+    leg.reflected_mass = 0.3;
+    leg.viscous_friction = 0.01 * before[0];
+    leg.coulomb_velocity = before[1];
+    leg.gear_ratio = leg.efficiency = 1.0;
+    leg.back_driving_efficiency = leg.servo_angle_at_min = leg.servo_angle_at_max = kNaN;
+    leg.torque_constant = leg.resistance = leg.thermal_resistance = kNaN;
+    leg.thermal_time_constant = kNaN;
+    std::fill_n(leg.base_joint_axis, 3, kNaN);
+    std::fill_n(leg.platform_joint_axis, 3, kNaN);
+    std::fill_n(leg.base_universal_axis, 3, kNaN);
+    std::fill_n(leg.platform_universal_axis, 3, kNaN);
+    leg.branch = 1.0;
+#define MINIMUM(bit, NAME, field, DEPENDS, quantity) leg.field = -kInfinite;
+#define MAXIMUM(bit, NAME, field, DEPENDS, quantity) leg.field = kInfinite;
+    STEWART_LIMITS(MINIMUM, MAXIMUM, MAXIMUM)
+#undef MINIMUM
+#undef MAXIMUM
+    leg.length_min = 0.0;
+    leg.lever_min = 0.1;
+    leg.angle_min = -0.9;
+    leg.angle_max = 0.85;
+    leg.crank_speed_max = 2.0;
+    leg.crank_torque_max = 80.0;
+  }
+  stewart_complete(&p);
+  int where;
+  CHECK(stewart_check(&p, &where) == STEWART_VALID);
+  return p;
+}
+
+/// Cranks: angles, speeds and torques at the shafts, clipped; angles as references; each rule.
+void test_cranks()
+{
+  const stewart_platform p = rig();
+  const stewart_pose at_home{{0.0, 0.0, 0.6481337615847757}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  FeedForward feed_forward(p, at_home, kTimeout), of_legs(p, at_home, kTimeout);
+  const Six feedback{50.0, -50.0, 0.0, 1.0, 0.0, 0.0};
+  bool clipped = false;
+  for (int n = 0; n < 200; ++n) {
+    PlatformReference reference = swing(n * 1e-3);
+    reference.position[2] += 0.6481337615847757 - 1.1;
+    Command command{}, of_angles{};
+    CHECK(feed_forward.update(reference, {}, feedback, n * kCycle, command) == STEWART_OK);
+    const stewart_motion motion = motion_of(reference);
+    stewart_result result;
+    CHECK(stewart_inverse_dynamics(&p, &motion, nullptr, nullptr, &result) == STEWART_OK);
+    LegReference angles;
+    for (std::size_t leg = 0; leg < 6; ++leg) {
+      CHECK(command.positions[leg] == result.angles[leg]);
+      CHECK(command.velocities[leg] == std::clamp(result.speeds[leg], -2.0, 2.0));
+      const double torque = result.torques[leg] + feedback[leg];
+      CHECK(command.efforts[leg] == std::clamp(torque, -80.0, 80.0));
+      clipped = clipped || command.efforts[leg] != torque;
+      angles.positions[leg] = result.angles[leg];
+      angles.velocities[leg] = result.speeds[leg];
+      angles.accelerations[leg] = 0.0;
+    }
+    CHECK(of_legs.update(angles, {}, {}, n * kCycle, of_angles) == STEWART_OK);
+    CHECK(close(of_angles.positions, command.positions, 1e-10));
+    CHECK(close(of_angles.velocities, command.velocities, 1e-9));
+  }
+  CHECK(clipped);
+  const std::pair<double, std::string> rejected[] = {
+    {0.05, "farther from the last command than limits.speed_max allows in setpoint.timeout"},
+    {0.17, "above limits.angle_max"}, {-0.12, "below limits.angle_min"},
+    {1.5, "a leg does not reach the platform"}};
+  for (const auto & [z, rule] : rejected) {
+    PlatformReference reference = home();
+    Command command{}, held{};
+    reference.position[2] = 0.6481337615847757;
+    feed_forward.start();
+    CHECK(feed_forward.update(reference, {}, {}, 1000 * kCycle, command) == STEWART_OK);
+    reference.position[2] += z;
+    const int code = feed_forward.update(reference, {}, {}, 1001 * kCycle, held);
+    CHECK(code == (z > 1.0 ? STEWART_UNREACHABLE : STEWART_SUPPRESSED));
+    CHECK(feed_forward.rejection() == rule);
+    CHECK(held.positions == command.positions && close(held.efforts, command.efforts, 1e-9));
+    CHECK(held.velocities == Six{});
+  }
+}
+
 /// Rz(gamma) Ry(beta) Rx(alpha): the columns of a turn about each axis.
 void test_rotation()
 {
@@ -683,6 +788,7 @@ int main()
   test_hold_of_legs();
   test_governor();
   test_imu();
+  test_cranks();
   test_rotation();
   std::printf("all checks passed\n");
   return 0;

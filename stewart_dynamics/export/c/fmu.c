@@ -31,8 +31,9 @@ double * fmu_value(fmu_instance * instance, uint32_t reference, fmu_type type, i
 {
   fmu_type actual = FMU_REAL;
   if (reference >= FMU_VALUES ||
-    (reference >= FMU_MOTOR_SPEEDS && !fmu_platform->with_motors) ||
-    (settable && reference >= FMU_LENGTHS))
+    (reference >= FMU_LEVERS ? !fmu_with_levers :
+    reference >= FMU_MOTOR_SPEEDS && !fmu_platform->with_motors) ||
+    (settable && reference >= FMU_POSITIONS))
   {
     return NULL;
   }
@@ -103,8 +104,9 @@ int fmu_step(fmu_instance * instance, double time)
       &instance->memory.state, &output);
   }
   if (code == STEWART_OK || code == STEWART_SUPPRESSED || code == STEWART_SINGULAR) {
-    memcpy(values + FMU_LENGTHS, output.result.lengths, 6 * sizeof *values);
-    memcpy(values + FMU_RATES, output.result.rates, 6 * sizeof *values);
+    memcpy(values + FMU_POSITIONS, fmu_positions(&output), 6 * sizeof *values);
+    memcpy(values + FMU_RATES, fmu_rates(&output), 6 * sizeof *values);
+    memcpy(values + FMU_LEVERS, output.result.levers, 6 * sizeof *values);
     memcpy(values + FMU_MOTOR_SPEEDS, output.motors.speeds, 6 * sizeof *values);
     values[FMU_DETERMINANT] = output.result.determinant;
     values[FMU_DETERMINANT_RATE] = output.result.determinant_rate;
@@ -115,7 +117,7 @@ int fmu_step(fmu_instance * instance, double time)
     }
   }
   for (n = 0; n < 6; n++) {
-    values[FMU_FORCES + n] = code == STEWART_OK ? output.forces[n] : 0.0;
+    values[FMU_EFFORTS + n] = code == STEWART_OK ? fmu_efforts(&output)[n] : 0.0;
     values[FMU_JOINT_FORCES + n] = code == STEWART_OK ? output.result.joint_forces[n] : 0.0;
     values[FMU_MOTOR_TORQUES + n] = code == STEWART_OK ? output.motors.commands[n] : 0.0;
   }
@@ -132,6 +134,7 @@ const char * fmu_text(int code)
     case STEWART_NOT_UNIT: return "forces are zero: orientation is not a unit quaternion";
     case STEWART_SINGULAR: return "forces are zero: det(J) is zero";
     case STEWART_SUPPRESSED: return "forces are zero: singularity.action or limits.action";
+    case STEWART_UNREACHABLE: return "forces are zero: a leg does not reach the platform";
     case STEWART_BROKEN_RULE: return "forces are zero: a parameter breaks a rule";
     default: return "forces are zero: an input or the time is out of range";
   }

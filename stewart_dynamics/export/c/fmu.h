@@ -48,9 +48,9 @@ enum {
   FMU_WARN_TIME = 59,
   FMU_SUPPRESS_NEAR_SINGULARITY = 60,
   FMU_SUPPRESS_AT_LIMITS = 61,
-  FMU_LENGTHS = 62,  /* the first output */
+  FMU_POSITIONS = 62,  /* of the drives: lengths or angles; the first output */
   FMU_RATES = 68,
-  FMU_FORCES = 74,
+  FMU_EFFORTS = 74,    /* to command: forces or torques */
   FMU_JOINT_FORCES = 80,
   FMU_DETERMINANT = 86,
   FMU_DETERMINANT_RATE = 87,
@@ -61,7 +61,8 @@ enum {
   FMU_TIME = 97,
   FMU_MOTOR_SPEEDS = 98,  /* the first of those that exist with drives alone */
   FMU_MOTOR_TORQUES = 104,
-  FMU_VALUES = 110
+  FMU_LEVERS = 110,       /* exist where the drives turn */
+  FMU_VALUES = 116
 };
 
 typedef enum {FMU_REAL, FMU_INTEGER, FMU_BOOLEAN, FMU_OTHER} fmu_type;
@@ -81,8 +82,14 @@ typedef struct {
 
 /* Of this hexapod, in model.c, which stewart_export writes. */
 extern const stewart_platform * const fmu_platform;
-extern const double fmu_start[FMU_LENGTHS];  /* inputs at the home pose, and parameters */
+extern const double fmu_start[FMU_POSITIONS];  /* inputs at the home pose, and parameters */
 extern const char * const fmu_token;         /* instantiationToken or guid */
+extern const int fmu_with_levers;            /* whether the variables at FMU_LEVERS exist */
+
+/* The numbers of a step that the kind of legs has at FMU_POSITIONS, FMU_RATES and FMU_EFFORTS. */
+const double * fmu_positions(const stewart_output * output);
+const double * fmu_rates(const stewart_output * output);
+const double * fmu_efforts(const stewart_output * output);
 
 /* Return a new instance, or NULL where the token is another hexapod's or memory is lacking. */
 fmu_instance * fmu_create(const char * token);

@@ -102,7 +102,8 @@ def home_pose(parameters: Parameters) -> Pose:
             'limits.length_min and limits.length_max on the '
             f'{POSITIVE if home.side > 0.0 else NEGATIVE} side of the base')
     if home.length is None:
-        raise ParameterError(f'{parameters.source}: {parameters.leg_kind.home_rule(parameters)}')
+        rule = parameters.leg_kind.home_rule(parameters, home_legs(parameters)['base'])
+        raise ParameterError(f'{parameters.source}: {rule}')
     return Pose(home.positions[0], home.rotations[0])
 
 

@@ -7,7 +7,8 @@
  *
  * A reference is followed or rejected as a whole. Rejected are one without forces (a return code
  * other than STEWART_OK), one with a leg outside limits.length_min and limits.length_max, and one
- * with a leg farther from the last command than limits.velocity_max allows in the timeout. Then
+ * with a leg farther from the last command than limits.velocity_max allows in the timeout (of
+ * cranks limits.angle_min, angle_max and speed_max). Then
  * the platform is held: positions are those of the last reference that was followed, velocities
  * zero, and efforts what keeps the platform at rest there, under the wrench of that reference;
  * motors stand, with the torques of those efforts. So position and effort always belong together,
@@ -47,7 +48,7 @@ struct PlatformReference
   std::array<double, 3> linear_acceleration, angular_acceleration;
 };
 
-/// Where the legs shall be: positions are length - zero_length [m].
+/// Where the legs shall be: positions are length - zero_length [m]; of cranks their angles [rad].
 struct LegReference
 {
   Six positions, velocities, accelerations;
@@ -56,9 +57,10 @@ struct LegReference
 /// Commands of a cycle, which follow the reference or hold the platform.
 struct Command
 {
-  Six positions;   // length - zero_length [m]
-  Six velocities;  // clipped to velocity_max [m/s]
-  Six efforts;     // clipped to force_max [N]
+  // Of telescopic legs, and of cranks:
+  Six positions;   // length - zero_length [m]; angles [rad]
+  Six velocities;  // clipped to velocity_max [m/s]; to limits.speed_max [rad/s]
+  Six efforts;     // clipped to force_max [N]; to limits.torque_max [N m]
   // Of the motors, zero without drive.*; + extends:
   Six torques;           // give the efforts; clipped to torque_max and torque_speed [N m]
   Six motor_velocities;  // clipped to speed_max, and to velocity_max times the ratio [rad/s]
@@ -153,9 +155,9 @@ private:
   int follow(
     const stewart_motion & motion, const Six & wrench, const Six & feedback, std::int64_t now,
     Command & command);
-  int check_lengths();
+  int check_positions();
   int put_loads(
-    const stewart_motion & motion, const stewart_output & output, const Six & feedback,
+    const stewart_motion & motion, const drive_values & drives, const Six & feedback,
     Command & command) const;
   void hold(const Six & feedback, std::int64_t now, Command & command);
   int reject(int code, const char * rule, int leg = 0);
@@ -173,11 +175,12 @@ private:
   std::int64_t timeout_, period_, updated_at_ = 0, followed_at_ = 0;
   bool started_ = false, catching_up_ = false;
   stewart_motion held_{};  // the last reference that was followed, at rest
-  Six held_lengths_{}, held_wrench_{};  // lengths of the last command
+  Six held_positions_{}, held_wrench_{};  // positions of the drives in the last command
   const char * rejection_ = nullptr;
   int rejected_leg_ = 0;
   stewart_state state_{};
   stewart_output output_{};
+  drive_values drives_{};  // of that output
 };
 
 }  // namespace stewart_dynamics_controller
