@@ -21,7 +21,7 @@ from running import (  # noqa: E402
     bits, DynamicsNode, ERROR, header, INPUTS, NODE, OK, ROOT, Sample, WARN)
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import Float64MultiArray  # noqa: E402
-from stewart_dynamics import StewartPlatform  # noqa: E402
+from stewart_dynamics import Capability, StewartPlatform  # noqa: E402
 from stewart_dynamics.mechanics.batch import missing_distances  # noqa: E402
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.replay.replay_command_line import main as replay  # noqa: E402
@@ -309,3 +309,17 @@ def ends_of(cylinder: Any) -> list[Any]:
     at, q, half = cylinder.pose.position, cylinder.pose.orientation, 0.5 * cylinder.scale.z
     rotation = np.reshape(from_quaternion(q.x, q.y, q.z, q.w), (3, 3))
     return [np.array([at.x, at.y, at.z]) + side * half * rotation[:, 2] for side in (-1.0, 1.0)]
+
+
+def test_travel_is_published(node: DynamicsNode) -> None:
+    messages = node.peer.listen(f'{NODE}/travel', Float64MultiArray)
+
+    def published() -> bool:
+        node.state_of(node.send(HOME))
+        return bool(messages)
+
+    node.until(published, 'the travel is published')
+    message = deserialize_message(messages[-1], Float64MultiArray)
+    expected = [Capability(PLATFORM).travel(PLATFORM.home_pose(), sign * np.eye(6)).value
+                for sign in (-1.0, 1.0)]
+    assert np.array(message.data).reshape(6, 2).T == pytest.approx(np.array(expected))

@@ -639,7 +639,7 @@ def test_cppcheck_finds_nothing(exported: Path) -> None:
 
 def test_the_source_is_short_and_needs_math_alone() -> None:
     texts = [source(name) for name in SOURCES]
-    assert sum(text.count('\n') for text in texts) < 2400  # of two kinds of legs
+    assert sum(text.count('\n') for text in texts) < 2600  # of two kinds of legs
     assert all(len(line) < 100 for text in texts for line in text.splitlines())
     assert set(re.findall('#include <(.*)>', ''.join(texts))) == {'math.h', 'stddef.h', 'stdint.h'}
 

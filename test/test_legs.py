@@ -39,7 +39,6 @@ NOT_FOR_CRANKS = 'legs.crank.length: {}: available for telescopic legs alone'
 # Arguments of each program, and the feature that hexapods with cranks lack.
 PROGRAMS = {
     'stewart_calibrate poses.csv': 'calibration', 'stewart_calibrate --design 20': 'calibration',
-    'stewart_capability': 'capability',
     'stewart_cueing_report vehicle.csv': 'motion cueing',
     'stewart_export --fmu --drives': '--drives', 'stewart_export --linuxcnc': '--linuxcnc',
     'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification',
@@ -88,7 +87,8 @@ def responses(platform: StewartPlatform) -> object:
 
 
 CALLS: dict[str, Callable[[StewartPlatform], object]] = {
-    'capability': Capability,
+    'clearance between legs': lambda platform: Capability(platform).clearance(
+        platform.home_pose()),
     'planned trajectories': planned,
     'motion cueing': lambda platform: MotionCueing(platform.parameters),
     'calibration': lambda platform: calibrate(

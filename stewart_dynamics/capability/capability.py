@@ -21,14 +21,13 @@ from stewart_dynamics.capability.growth import Growth
 from stewart_dynamics.capability.motions import Deviations, faster, timed
 from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.capability.quantities import (
-    Angles, Conditioning, Lengths, starts_at)
+    Angles, Conditioning, Lengths, Levers, Quantity, starts_at, Turns)
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
 from stewart_dynamics.capability.stuck_leg import remaining
 from stewart_dynamics.capability.travel import ENDS
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.legs import require_kind
-from stewart_dynamics.legs.telescopic import TELESCOPIC
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, copies, wrong_type)
@@ -42,17 +41,18 @@ from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
-    ACCELERATION, DETERMINANT, FORCES, MOTION, POSE, TWIST)
+    ACCELERATION, DETERMINANT, FORCES, JOINT_FORCES, MOTION, POSE, TWIST)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, NaturalModes
+from stewart_dynamics.parameters.table import Parameters
 
-CAPABLE = (TELESCOPIC,)
-"""The kinds of legs whose capability is known."""
 _ENDS = np.array(ENDS)
 # Bounds where a minimum is not given.
 _UNLIMITED = {limits.LENGTH_MIN: 0.0, limits.CLEARANCE_MIN: -math.inf}
-# Limits of a path; of those that are exceeded at one sample the first one is named.
-_OF_PATHS = (limits.LENGTH_MIN, limits.LENGTH_MAX, limits.CLEARANCE_MIN, *limits.OF_JOINTS)
+# Limits of a path, after those of drives; of those that are exceeded at one sample the first one
+# is named.
+_OF_PATHS = (limits.CLEARANCE_MIN, *limits.OF_JOINTS)
+_OTHER_ENDS = slice(-6, None)  # of legs, in ``load_rows``
 # Rounds in which the least tilt between two azimuths is found.
 _ZOOMS = 6
 # Step of a numerical derivative by the pose [m, rad].
@@ -168,8 +168,9 @@ class Capability:
     def __init__(self, platform: StewartPlatform) -> None:
         if not isinstance(platform, StewartPlatform):
             raise wrong_type('platform', platform, 'a StewartPlatform')
-        require_kind(platform.parameters, 'capability', *CAPABLE)
         self.platform = platform
+        self._kind = kind = platform.parameters.leg_kind
+        self._known = limits.limits_of(platform.parameters)
         self._pose_limits = PoseLimits(platform.parameters)
         self._limits = self._pose_limits.limits
         bounds = self._limits.bounds
@@ -190,7 +191,9 @@ class Capability:
                 self._bounds[2:4] < math.pi).any() else None,
             Conditioning(self._pose_limits.stop_condition),
             None if clearance is None else Clearance(
-                clearance.shapes, nearest, size, *map(len, self._plates)), size)
+                clearance.shapes, nearest, size, *map(len, self._plates)), size,
+            _on_circles(platform.parameters))
+        self._ends_differ = kind.ends_differ and kind.joint_force_limit in bounds
         self._motors = MotorBounds(platform.parameters) if platform.parameters.drives else None
         self._frictionless = StewartPlatform(platform.parameters.replaced({
             'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}))
@@ -311,7 +314,8 @@ class Capability:
 
         The curves on which lengths and joint angles end are exact; holes are holes. Boundaries at
         singularities and at the clearance of the legs, if there are any, are exact at points of a
-        grid of 128 x 128; parts that are thinner than one of its steps are missed.
+        grid of 128 x 128; parts that are thinner than one of its steps are missed. So are all
+        boundaries of legs whose lengths do not change, and whose anchors are moved.
 
         Parameters
         ----------
@@ -321,7 +325,7 @@ class Capability:
             Base axis normal to the plane: the platform's origin has the pose's coordinate there.
 
         """
-        if limits.LENGTH_MAX not in self._limits.bounds:
+        if not (self._margins.circles or limits.LENGTH_MAX in self._limits.bounds):
             raise self._unlimited((limits.LENGTH_MAX,))
         if normal not in ('x', 'y', 'z'):
             raise wrong_type('normal', normal, "'x', 'y' or 'z'")
@@ -459,6 +463,7 @@ class Capability:
 
     def clearance(self, pose: Pose | Motion) -> Array | float:
         """Return the smallest distance of a leg from another or a plate [m]; negative: overlap."""
+        require_kind(self.platform.parameters, 'clearance between legs')
         values = LegClearance(self.platform.parameters)(motion_rows(pose)).min(axis=1)
         return float(values[0]) if pose.shape == () else values.reshape(pose.shape)
 
@@ -472,7 +477,7 @@ class Capability:
         check_kind(pose, Pose, Motion)
         legs = lagrange.legs(self.platform.parameters, pose.position, pose.rotation)
         return self.platform.stiffness(pose, leg_stiffness) + geometric_stiffness(
-            legs, self._results(self._held(pose), None)[..., FORCES], pose.rotation,
+            legs, self._results(self._held(pose), None)[..., self._efforts], pose.rotation,
             self.platform.screws)
 
     def modes(self, pose: Pose | Motion, leg_stiffness: ArrayLike) -> NaturalModes:
@@ -521,7 +526,7 @@ class Capability:
         moving = Motion.of_rows(rows)
         found = self._of_rates(moving, self.platform.inverse_dynamics(moving))
         if not found:
-            raise self._unlimited((limits.VELOCITY_MAX,))
+            raise self._unlimited((self._kind.rate_limit,))
         return _divided(_smallest(*_tightest(found)), sizes)
 
     def acceleration(self, pose: Pose | Motion, direction: ArrayLike,
@@ -570,6 +575,7 @@ class Capability:
             raise MotionError('continuous: must be False for a motion: drive.torque_continuous '
                               'limits what is held at rest')
         if times is not None:
+            self._check_between()
             return timed(
                 times, motion, lambda each, _: self.payload(
                     each, center_of_mass, wrench=wrench, base=base),
@@ -578,8 +584,8 @@ class Capability:
                 wrench, base)
         moving = motion if isinstance(motion, Motion) else Motion.from_pose(motion)
         return self._added_mass(
-            moving, self.platform.inverse_dynamics(moving, wrench, base).rows, center_of_mass,
-            base, whole=isinstance(motion, Motion), continuous=continuous)
+            moving, self.load_rows(moving, wrench, base), center_of_mass, base,
+            whole=isinstance(motion, Motion), continuous=continuous)
 
     def _added_mass(self, moving: Motion, results: Array, center_of_mass: ArrayLike,
                     base: BaseMotion | None = None, **how: Any) -> Extent:
@@ -629,6 +635,7 @@ class Capability:
 
         """
         if times is not None:
+            self._check_between()
             return timed(times, motion, lambda each, _: self.speed_factor(each, wrench, base),
                          lambda k: (self.platform, faster(motion.rows, k), k), wrench, base)
         solved = self.platform.inverse_dynamics(motion, singular='nan')
@@ -637,7 +644,7 @@ class Capability:
             return ended
         found = [*self._of_rates(motion, solved), *self._speed_of_forces(motion, wrench, base)]
         if not found:
-            raise self._unlimited((limits.VELOCITY_MAX, limits.FORCE_MAX))
+            raise self._unlimited((self._kind.rate_limit, self._kind.effort_limit))
         return _of_all(*_tightest(found))
 
     def amplitude_factor(self, motion: Motion, center: Pose | Motion | None = None,
@@ -675,6 +682,7 @@ class Capability:
         start = self._single(Pose(motion.position[0], motion.rotation[0]) if center is None
                              else center)
         if times is not None:
+            self._check_between()
             return timed(
                 times, motion, lambda each, most: self._amplitude(each, start, wrench, base, most),
                 lambda k: (self.platform, Deviations(start, motion.rows).at(k), 1.0), wrench, base)
@@ -709,7 +717,7 @@ class Capability:
         of_poses = self._pose_limits
         values = of_poses.values(motions, results)
         exceeded = [(limits.short_name(name), self._limits.exceeds(name, values[name]))
-                    for name in _OF_PATHS if name in values]
+                    for name in (*of_poses.of_drives, *_OF_PATHS) if name in values]
         regular = of_poses.regular(results, results[:1, DETERMINANT])
         ends = [(*np.argwhere(each)[0].tolist(), name) for name, each in exceeded if each.any()]
         if not regular.all():
@@ -724,7 +732,7 @@ class Capability:
         found: list[tuple[Array, Any]] = [
             (largest_multiple(np.zeros(6), solved.rows[..., limits.LIMITS[name].columns],
                               self._limits.bounds[name]), limits.short_name(name))
-            for name in limits.OF_RATES if name in self._limits.bounds]
+            for name in self._known.rates if name in self._limits.bounds]
         if self._motors is not None and self._motors.limits_speeds:
             found.append((largest_multiple(
                 np.zeros(6), self._motors.moving(motion.rows, solved.rows).speeds,
@@ -741,27 +749,28 @@ class Capability:
         still, back = rows.copy(), rows.copy()
         still[..., TWIST.start:] = 0.0
         back[..., TWIST] = -rows[..., TWIST]
-        solved = self._frictionless.inverse_dynamics(motion, wrench, base)
-        at_rest, backward = (
-            self._frictionless.inverse_dynamics(Motion.of_rows(each), wrench, base).rows
-            for each in (still, back))
-        powers = at_rest, (solved.rows - backward) / 2.0, (solved.rows + backward) / 2.0 - at_rest
+        solved, at_rest, backward = (
+            self.load_rows(Motion.of_rows(each), wrench, base, self._frictionless)
+            for each in (rows, still, back))
+        powers = at_rest, (solved - backward) / 2.0, (solved + backward) / 2.0 - at_rest
+        effort_max = self._kind.effort_limit
         found: list[tuple[Array, Any]] = [(quadratic_exit(
-            _of_limit(name, powers), self._limits.bounds[name], np.zeros(()),
+            [each[..., columns] for each in powers], self._limits.bounds[name], np.zeros(()),
             np.full((), math.inf)), limits.short_name(name))
-            for name in self._limits.of_loads if name != limits.FORCE_MAX]
-        strongest = self._limits.bounds.get(limits.FORCE_MAX)
-        constant, linear, square = _of_limit(limits.FORCE_MAX, powers)
+            for name in self._limits.of_loads if name != effort_max
+            for columns in self._columns(name)]
+        strongest = self._limits.bounds.get(effort_max)
+        constant, linear, square = (each[..., self._efforts] for each in powers)
         friction = Friction.of(self.platform.parameters)
-        rates = self.platform.drive_rates(rows, solved.rates)
+        rates = self._drive_rates(rows, solved)
         linear = linear + friction.viscous * rates
         for piece in friction.coulomb_by_speed(rates):
             forces = constant + piece.constant, linear + piece.linear, square
             if strongest is not None:
                 found.append((quadratic_exit(forces, strongest, piece.begin, piece.end),
-                              limits.short_name(limits.FORCE_MAX)))
+                              limits.short_name(effort_max)))
             if self._motors is not None and torques:
-                motors = self._motors.moving(rows, solved.rows)
+                motors = self._motors.moving(rows, solved)
                 none = np.zeros(6)
                 found.append(self._motors.exits(
                     (*forces[:2], forces[2] - motors.inertial), (none, none, motors.own),
@@ -782,17 +791,58 @@ class Capability:
         return Motion.of_rows(rows)
 
     def _results(self, motion: Motion, base: BaseMotion | None) -> Array:
-        return self.platform.inverse_dynamics(motion, base=base).rows
+        return self.load_rows(motion, base=base)
+
+    @property
+    def _efforts(self) -> slice:
+        return self._kind.effort.columns
+
+    def _columns(self, name: str) -> tuple[slice, ...]:
+        """Return where the values of a limit of loads are in rows of ``load_rows``."""
+        if self._kind.ends_differ and name == self._kind.joint_force_limit:
+            return FORCES, _OTHER_ENDS
+        return limits.LIMITS[name].columns,
+
+    def _drive_rates(self, rows: Array, results: Array) -> Array:
+        return self.platform.drive_rates(rows, results[..., self._kind.rate.columns])
+
+    def _check_between(self) -> None:
+        require_kind(self.platform.parameters, 'a motion between its samples')
+
+    def load_rows(self, motion: Motion, wrench: ArrayLike | None = None,
+                  base: BaseMotion | None = None, platform: StewartPlatform | None = None,
+                  ) -> Array:
+        """
+        Return rows of results, all of whose loads are affine in wrenches and accelerations.
+
+        Where forces differ between the ends of a leg, and have a limit, a row of results has the
+        one that is larger, which is not affine: behind it are the six forces at the ends that are
+        not those of ``forces``.
+
+        platform: a hexapod that differs by friction; by default that of the capability.
+        """
+        platform = self.platform if platform is None else platform
+        rows = platform.inverse_dynamics(motion, wrench, base).rows
+        if not self._ends_differ:
+            return rows
+        # with a push along all legs that is larger than the forces, the larger one is the greater
+        # one, and with a pull the lesser one: they are those of both ends
+        push = 2.0 * np.abs(rows[..., JOINT_FORCES]).max(axis=-1, keepdims=True)
+        pushes = np.where(push > 0.0, push, 1.0) * platform.inverse_jacobian(motion).sum(axis=-2)
+        load = np.zeros(6) if wrench is None else np.asarray(wrench, dtype=float)
+        pushed, pulled = (platform.inverse_dynamics(motion, load - each, base).rows[
+            ..., JOINT_FORCES] for each in (pushes, -pushes))
+        return np.concatenate([rows, pushed + pulled - rows[..., FORCES]], axis=-1)
 
     def _change(self, pose: Pose | Motion, wrench: ArrayLike | None = None,
                 acceleration: Array | None = None) -> Array:
-        """Return the results (..., RESULT) of a wrench or acceleration alone, without weight."""
+        """Return ``load_rows`` of a wrench or acceleration alone, without weight."""
         still = self._held(pose)
         if acceleration is not None:
             rows = np.zeros((*np.broadcast_shapes(still.shape, acceleration.shape[:-1]), MOTION))
             rows[..., POSE], rows[..., ACCELERATION] = still.rows[..., POSE], acceleration
             still = Motion.of_rows(rows)
-        return self.platform.inverse_dynamics(still, wrench, BaseMotion(np.zeros(3))).rows
+        return self.load_rows(still, wrench, BaseMotion(np.zeros(3)))
 
     def _multiple(self, motion: Motion, results: Array, change: Array, whole: bool = False,
                   directions: Array | None = None, continuous: bool = False,
@@ -800,29 +850,29 @@ class Capability:
         """
         Return the largest multiple of a change of results that forces and torques permit.
 
-        results, change (..., RESULT): of the motion, and of a load or acceleration alone.
+        results, change: ``load_rows`` of the motion, and of a load or acceleration alone.
         ``directions`` (..., 6): the change is that of this acceleration.
         continuous: the load is held without end.
         stuck: index of a leg whose actuator does not limit; its joints do.
         """
-        forces, added = results[..., FORCES], change[..., FORCES]
+        forces, added = results[..., self._efforts], change[..., self._efforts]
         of_actuators: list[tuple[Array, Any]] = []
         of_joints: list[tuple[Array, Any]] = []
         if continuous:
             of_actuators.append((largest_multiple(forces, added, self._continuous_forces),
                                  limits.short_name(limits.TORQUE_CONTINUOUS)))
         for name in self._limits.of_loads:
-            here, more = _of_limit(name, (results, change))
-            (of_actuators if name == limits.FORCE_MAX else of_joints).append((
-                largest_multiple(here, more, self._limits.bounds[name]),
-                limits.short_name(name)))
+            group = of_actuators if name == self._kind.effort_limit else of_joints
+            group += [(largest_multiple(results[..., columns], change[..., columns],
+                                        self._limits.bounds[name]), limits.short_name(name))
+                      for columns in self._columns(name)]
         if self._motors is not None and self._motors.limited:
             of_actuators.append(self._torques(self._motors, motion, forces, added, directions))
         if stuck is not None:
             for each, _ in of_actuators:
                 each[..., stuck] = math.inf
         if not (of_actuators or of_joints):
-            raise self._unlimited((limits.FORCE_MAX,))
+            raise self._unlimited((self._kind.effort_limit,))
         multiples, names = _tightest([*of_actuators, *of_joints])
         return (_of_all if whole else _smallest)(multiples, names)
 
@@ -838,7 +888,7 @@ class Capability:
             accelerated = rows.copy()
             accelerated[..., ACCELERATION] += directions
             more = bounds.moving(accelerated, solved.rows)
-        rates = self.platform.drive_rates(rows, solved.rates)
+        rates = self._drive_rates(rows, solved.rows)
         slow = Friction.of(self.platform.parameters).is_linear(rates)
         return bounds.exits(
             (forces - motors.inertial, change - (more.inertial - motors.inertial), none),
@@ -848,7 +898,7 @@ class Capability:
     @property
     def limits_rates(self) -> bool:
         """Return whether there is a limit of the legs' rates or of the motors' speeds."""
-        return any(name in self._limits.bounds for name in limits.OF_RATES) or (
+        return any(name in self._limits.bounds for name in self._known.rates) or (
             self._motors is not None and self._motors.limits_speeds)
 
     @property
@@ -867,14 +917,14 @@ class Capability:
         """
         Return the largest loads (6,) of legs at rest, or those that are held without end.
 
-        Each with its columns in a row of results. Motors limit the forces by their torques.
+        Each with its columns in ``load_rows``. Motors limit the efforts by their torques.
         """
-        found = [(limits.LIMITS[name].columns, self._limits.bounds[name])
-                 for name in self._limits.of_loads]
+        found = [(columns, self._limits.bounds[name]) for name in self._limits.of_loads
+                 for columns in self._columns(name)]
         if self._motors is not None and self._motors.limited:
-            found.append((FORCES, self._motors.forces_at_rest))
+            found.append((self._efforts, self._motors.forces_at_rest))
         if continuous:
-            found.append((FORCES, self._continuous_forces))
+            found.append((self._efforts, self._continuous_forces))
         return found
 
     @property
@@ -885,7 +935,7 @@ class Capability:
     def _in_every_direction(self, pose: Pose | Motion, part: slice, continuous: bool,
                             ) -> Array | float:
         if not (self.limits_forces or continuous):
-            raise self._unlimited((limits.FORCE_MAX,))
+            raise self._unlimited((self._kind.effort_limit,))
         still = self._held(pose)
         results = self._results(still, None)
         per_wrench = self._change(Motion.of_rows(still.rows[..., None, :]), np.eye(6)[part])
@@ -902,9 +952,14 @@ class Capability:
                               'no answer')
 
 
-def _of_limit(name: str, rows: Sequence[Array]) -> list[Array]:
-    """Return the values (..., 6) of the quantity of a limit in rows of results."""
-    return [each[..., limits.LIMITS[name].columns] for each in rows]
+def _on_circles(p: Parameters) -> tuple[Quantity, ...]:
+    """Return the quantities with limits of drives whose anchors move on circles."""
+    circles = p.leg_kind.anchor_circles(p)
+    if circles is None:
+        return ()
+    levers = Levers(circles, travel.LIMITED.index(p.leg_kind.lever_limit))
+    turns = Turns(circles, [travel.LIMITED.index(name) for name in circles.limits])
+    return (levers, turns) if len(turns.legs) else (levers,)
 
 
 def _directions(value: ArrayLike) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.limits import LIMITS, OF_LOADS, OF_RATES, short_name, SPEED_MAX
+from stewart_dynamics.mechanics.limits import LIMITS, limits_of, short_name, SPEED_MAX
 from stewart_dynamics.mechanics.rows import BASE, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
@@ -76,7 +76,9 @@ class Growth:
                  motors: MotorBounds | None, deviations: Deviations,
                  wrench: ArrayLike | None = None, base: BaseMotion | None = None) -> None:
         self._platform, self._motors, self._deviations = platform, motors, deviations
-        self._limits = {name: limits[name] for name in (*OF_RATES, *OF_LOADS) if name in limits}
+        known = limits_of(platform.parameters)
+        self._limits = {name: limits[name] for name in (*known.rates, *known.loads)
+                        if name in limits}
         self.names = [short_name(name) for name in self._limits] + (
             [] if motors is None else [short_name(SPEED_MAX), 'torque'])
         self._count = len(deviations.changes)

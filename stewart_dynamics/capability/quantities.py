@@ -30,6 +30,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.capability.intervals import (
     cross, dot, Enclosure, joined, length, unit)
+from stewart_dynamics.legs.lines import AnchorCircles
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.parameters.table import Parameters
@@ -37,6 +38,7 @@ from stewart_dynamics.parameters.table import Parameters
 ROUNDING = 1e-12
 """A value within this of its limit, relative to the limit or the hexapod's size, is on it."""
 _EPS = 1e-15  # above rounding errors of a few operations
+_LEAST_SLOPE = 1e-3  # of the margin of a range that is nearly a turn
 _SKEW = np.zeros((3, 3, 3))  # v @ (spin @ _SKEW) is spin x v
 _SKEW[[0, 1, 2], [1, 2, 0], [2, 0, 1]], _SKEW[[0, 1, 2], [2, 0, 1], [1, 2, 0]] = 1.0, -1.0
 
@@ -51,10 +53,12 @@ class Starts(NamedTuple):
     base: Array  # corners of the base's plate from the pivot (N, M, 3)
     platform: Array  # corners of the platform's plate from the pivot (N, M, 3)
     sides: Array  # det(J) (N,)
+    circles: AnchorCircles | None = None  # of the hexapod, whose anchors move
 
-    def take(self, which: Integers) -> Starts:
+    def take(self, which: Integers | Flags | slice) -> Starts:
         """Return some of the rows."""
-        return Starts(*(each[which] for each in self))
+        return Starts(self.centers[which], self.arms[which], self.levers[which], self.axes[which],
+                      self.base[which], self.platform[which], self.sides[which], self.circles)
 
 
 def starts_at(parameters: Parameters, axes: Array, plates: Sequence[Array], rows: Array,
@@ -69,12 +73,14 @@ def starts_at(parameters: Parameters, axes: Array, plates: Sequence[Array], rows
     joints, pivots = parameters.geometry.platform_joints, pivots[:, None]
     centers = rows[:, None, POSITION] + pivots @ turn
     to_centers, arms = centers - parameters.geometry.base_joints, (joints - pivots) @ turn
-    lines = to_centers + arms
+    circles = parameters.leg_kind.anchor_circles(parameters)
     levers = joints @ turn / parameters.singularity.characteristic_length
     with np.errstate(all='ignore'):
+        lines = to_centers + arms if circles is None else parameters.leg_kind.lines(
+            parameters, rows[:, POSITION], rows[:, ROTATION].reshape(-1, 3, 3)).directions
         sides = np.linalg.det(np.concatenate([lines, np.cross(levers, lines)], axis=2))
     return Starts(to_centers, arms, levers, axes[6:] @ turn, plates[0] - centers,
-                  (plates[1] - pivots) @ turn, sides)
+                  (plates[1] - pivots) @ turn, sides, circles)
 
 
 class Moved:
@@ -129,9 +135,49 @@ class Moved:
         return self.lengths.inverse()
 
     @cached_property
+    def lever_squares(self) -> Enclosure:
+        """Return the squares of h (N, 6) [m^2], length / radius of the lever on a circle."""
+        circles = self.circles
+        radii, lengths = circles.radii, circles.lengths
+        self._across = joined([dot(self.lines, each)[..., None] for each in (
+            circles.along, circles.across)])
+        self._reach = self._across.square().sum()
+        self._part = (self.squares + (radii * radii - lengths * lengths)) * (0.5 / radii)
+        return self._reach - self._part.square()
+
+    @cached_property
+    def turned_circles(self) -> Enclosure:
+        """
+        Return cosines and sines of the positions of drives on circles (N, 6, 2).
+
+        With x, y across the axis, ``x cos q + y sin q = g``, and h. Of points that a line does
+        not reach those of the dead centre; unknown near it.
+        """
+        h = _not_negative(self.lever_squares).sqrt() * self.circles.signs
+        x, y, g = self._across[..., 0], self._across[..., 1], self._part
+        inverse = self._reach.inverse()
+        return joined([each[..., None] for each in (
+            (x * g + y * h) * inverse, (y * g - x * h) * inverse)])
+
+    @property
+    def circles(self) -> AnchorCircles:
+        """Return the circles of the anchors, which move."""
+        assert self.starts.circles is not None
+        return self.starts.circles
+
+    @cached_property
+    def directions(self) -> Enclosure:
+        """Return unit vectors (N, 6, 3) along which legs push the platform joints."""
+        if self.starts.circles is None:
+            return unit(self.lines)
+        turned, circles = self.turned_circles, self.circles
+        along = turned[..., :1] * circles.along + turned[..., 1:] * circles.across
+        return (self.lines - along * circles.radii[:, None]) * (1.0 / circles.lengths[:, None])
+
+    @cached_property
     def matrices(self) -> Enclosure:
         """Return the scaled J_inv (N, 6, 6)."""
-        directions = unit(self.lines)
+        directions = self.directions
         return joined([directions, cross(self.turned(self.starts.levers), directions)])
 
     def turned(self, vectors: Array) -> Enclosure:
@@ -154,6 +200,12 @@ class Moved:
         """Return unit vectors (I, 3) of some rows as seen from the platform."""
         seen: Array = np.einsum('nij,nj->ni', self._rotation[rows], normals)
         return seen
+
+
+def _not_negative(numbers: Enclosure) -> Enclosure:
+    """Return the same numbers with centers that are not negative."""
+    low = np.minimum(numbers.center, 0.0)
+    return Enclosure(numbers.center - low, numbers.slopes, numbers.rest - low)
 
 
 class Quantity(ABC):
@@ -241,14 +293,90 @@ class Angles(Quantity):
 
     def margins(self, moved: Moved) -> Enclosure:
         """Return margins over cells."""
-        return joined([dot(moved.lines, axes) * moved.inverse_lengths for axes in (
-            self._axes, moved.turned(moved.starts.axes))])[:, self._limited] - self._cosines
+        both = self._axes, moved.turned(moved.starts.axes)
+        if moved.starts.circles is None:
+            cosines = [dot(moved.lines, axes) * moved.inverse_lengths for axes in both]
+        else:
+            cosines = [dot(moved.directions, axes) for axes in both]
+        return joined(cosines)[:, self._limited] - self._cosines
 
     def excesses(self, margins: Array) -> Array:
         """Return by how much limits are exceeded, relative, at margins (N, 12)."""
         found: Array = np.arccos(np.clip(
             margins + self._cosines, -1.0, 1.0)) / self._bounds - 1.0
         return found
+
+
+class Levers(Quantity):
+    """
+    Levers of drives on circles; margins (N, 6) ``h^2 / length^2 - least^2``.
+
+    They are polynomials of the position of the platform joint: a leg reaches it, and its lever is
+    large enough, where they are positive.
+
+    code: of the limit.
+    """
+
+    legs: Integers = np.arange(6)
+
+    def __init__(self, circles: AnchorCircles, code: int) -> None:
+        self._scales = 1.0 / circles.lengths ** 2
+        self._least = circles.least
+        self.codes = np.full(6, code)
+
+    def margins(self, moved: Moved) -> Enclosure:
+        """Return margins over cells."""
+        return moved.lever_squares * self._scales - self._least ** 2
+
+    def excesses(self, margins: Array) -> Array:
+        """Return by how much the levers are too small (N, 6), by the largest lever."""
+        squares = margins + self._least ** 2
+        found: Array = self._least - np.copysign(np.sqrt(np.abs(squares)), squares)
+        return found
+
+
+class Turns(Quantity):
+    """
+    Positions of drives on circles; margins (N, M) ``cos(q - middle) - cos half``, scaled.
+
+    The cosine has one value on all of the circle, also where the position begins again.
+
+    codes: of the limits past which positions are above and below.
+    """
+
+    def __init__(self, circles: AnchorCircles, codes: Sequence[int]) -> None:
+        self._limited = limited = np.flatnonzero(np.isfinite(circles.halves))
+        self._halves = halves = circles.halves[limited]
+        middles = circles.middles[limited]
+        self._middles = np.stack([np.cos(middles), np.sin(middles)], axis=-1)
+        # no position is within a range that is empty
+        self._cosines = np.where(halves < 0.0, 2.0, np.cos(halves))
+        self._scales = 1.0 / np.maximum(np.sin(halves), _LEAST_SLOPE)
+        self.legs = np.concatenate([limited, limited])
+        self.codes = np.repeat(codes, len(limited))
+
+    def margins(self, moved: Moved) -> Enclosure:
+        """Return margins over cells, one for each leg."""
+        cosines = dot(moved.turned_circles[:, self._limited], self._middles)
+        found: Enclosure = (cosines - self._cosines) * self._scales
+        return found
+
+    def values(self, moved: Moved) -> Array:
+        """Return how far positions are below the upper limit (N, M), and above the lower one."""
+        return -self.excesses_at(moved)
+
+    def excesses(self, margins: Array) -> Array:
+        """Return by how much positions are out of their ranges (N, M), at margins."""
+        found: Array = np.arccos(np.clip(
+            margins / self._scales + self._cosines, -1.0, 1.0)) - self._halves
+        return found
+
+    def excesses_at(self, moved: Moved) -> Array:
+        """Return by how much positions are above and below their ranges (N, 2 M), at points."""
+        x, y = np.moveaxis(moved.turned_circles.center[:, self._limited], -1, 0)
+        cosine, sine = self._middles.T
+        offsets = np.arctan2(y * cosine - x * sine, x * cosine + y * sine)
+        return np.concatenate([offsets - self._halves, -offsets - self._halves], axis=1)
 
 
 class Conditioning(Quantity):
@@ -269,7 +397,11 @@ class Conditioning(Quantity):
 
     def weights(self, moved: Moved, slopes: Array) -> Array:
         """Return by how much the edges of cells change the matrix (D, N)."""
-        return _norm(_inverses(moved.matrices.center) @ moved.matrices.slopes)
+        found = _norm(_inverses(moved.matrices.center) @ moved.matrices.slopes)
+        if moved.starts.circles is None:
+            return found
+        # near a dead centre slopes are not known
+        return np.where(np.isfinite(found), found, super().weights(moved, np.zeros(found.shape)))
 
     def values(self, moved: Moved) -> Array:
         """

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.capability.quantities import Moved, Quantity, Starts
 from stewart_dynamics.capability.travel import (
-    ENDS, Ends, NOTHING, PoseMargins, SINGULARITY as SINGULAR)
+    ENDS, Ends, LIMITED, NOTHING, PoseMargins, SINGULARITY as SINGULAR)
 from stewart_dynamics.capability.workspace import smallest
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
@@ -23,7 +23,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector
 from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, LENGTH_MAX, Limits, OF_JOINTS, OF_POSES, SINGULARITY, TOLERANCE)
+    CLEARANCE_MIN, LIMITS, Limits, OF_JOINTS, SINGULARITY, TOLERANCE)
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
@@ -46,9 +46,10 @@ class Worst(NamedTuple):
     """Name of the limit without ``limits.``, or ``singularity``."""
     excess: float
     """
-    Past the limit [m, rad, or condition number]; negative where the limit is kept.
+    Past the limit, in its unit, or condition number; negative where the limit is kept.
 
-    Infinite where det(J) has changed its sign: a singularity is between this pose and the others.
+    Infinite where det(J) has changed its sign: a singularity is between this pose and the others;
+    and where a leg does not reach the platform.
     """
 
 
@@ -255,16 +256,20 @@ class Boxes:
             if not solved.determinant * self._starts.sides[0] > 0.0:
                 excess = math.inf
             return Worst(pose, -1, SINGULARITY, excess)
-        name = OF_POSES[code]
+        name, p = LIMITED[code], self._platform.parameters
         if name == CLEARANCE_MIN:
-            values = LegClearance(self._platform.parameters)(Motion.from_pose(pose).rows[None])[0]
+            values = LegClearance(p)(Motion.from_pose(pose).rows[None])[0]
         elif name in OF_JOINTS:
             values = self._platform.joint_angles(pose)[OF_JOINTS.index(name)]
+        elif name == p.leg_kind.lever_limit:
+            solved = self._platform.solve(Motion.from_pose(pose).rows[None])[0]
+            values = p.leg_kind.lever_ratios(p, solved)
+            if not np.isfinite(solved).all():
+                return Worst(pose, leg, ENDS[code], math.inf)
         else:
             values = self._platform.inverse_kinematics(pose)
         excess = float(values[leg] - self._bounds[name][leg])
-        return Worst(pose, leg, ENDS[code], excess if name in (
-            LENGTH_MAX, *OF_JOINTS) else -excess)
+        return Worst(pose, leg, ENDS[code], -excess if LIMITS[name].minimum else excess)
 
     def poses(self, points: Array) -> Pose:
         """Return the poses of translations and rotation vectors (..., 6)."""

@@ -28,8 +28,12 @@ from stewart_dynamics.mechanics import limits
 
 CLEARANCE_MIN, SINGULARITY, NOTHING = 4, 5, 6
 """Codes of the limit that ends a travel, behind those of lengths and angles."""
-ENDS = (*map(limits.short_name, limits.OF_POSES), limits.SINGULARITY, '')
-"""Names of all ends of travels by their codes: limits of poses first."""
+LIMITED = (*limits.OF_POSES, limits.SINGULARITY, '', *(
+    name for name in limits.LIMITS if limits.LIMITS[name].depends == limits.POSE
+    and name not in limits.OF_POSES))
+"""Limits of all ends of travels by their codes."""
+ENDS = tuple(map(limits.short_name, LIMITED))
+"""Names of all ends of travels by their codes."""
 
 LENGTH_MAX = 1
 # Pieces of a travel at first, and largest number of pieces of a block of travels.
@@ -65,12 +69,14 @@ class PoseMargins(NamedTuple):
     condition: Conditioning
     clearance: Clearance | None
     size: float  # of the hexapod [m]
+    circles: tuple[Quantity, ...] = ()  # of drives whose anchors move on circles
 
     @property
     def given(self) -> list[Quantity]:
         """Return the quantities, those that are proven in a short time first."""
-        return [each for each in (self.lengths, self.angles, self.clearance, self.condition)
-                if each is not None]
+        return [*self.circles, *(
+            each for each in (self.lengths, self.angles, self.clearance, self.condition)
+            if each is not None)]
 
 
 class _Travels:
@@ -90,7 +96,7 @@ class _Travels:
 
     def take(self, which: Flags) -> _Travels:
         """Return some of the travels."""
-        return _Travels(Starts(*(each[which] for each in self.starts)), self.directions[which],
+        return _Travels(self.starts.take(which), self.directions[which],
                         None if self._units is None else self._units[which], self._least)
 
     def needed(self, ends: Array) -> Array:
@@ -129,8 +135,7 @@ def travels(margins: PoseMargins, starts: Starts, directions: Array,
         values = ends.values[block]
         with np.errstate(all='ignore'):
             _shorten(Ends(values, ends.codes[block], ends.legs[block]), margins,
-                     _Travels(Starts(*(each[block] for each in starts)), directions[block], own,
-                              least))
+                     _Travels(starts.take(block), directions[block], own, least))
         if own is not None:
             least = float(np.fmin.reduce(values / own, initial=least))
     return ends
@@ -146,7 +151,8 @@ def _shorten(ends: Ends, margins: PoseMargins, block: _Travels) -> None:
     if closed.any() and margins.lengths is not None:
         _keep(ends, np.flatnonzero(closed), *_ends_of_lengths(
             margins.lengths, block.take(closed)))
-    for quantity, which in ((margins.lengths, ~closed), (margins.angles, ways > 0.0),
+    for quantity, which in (*((each, ways > 0.0) for each in margins.circles),
+                            (margins.lengths, ~closed), (margins.angles, ways > 0.0),
                             (margins.condition, ways > 0.0), (margins.clearance, ways > 0.0)):
         if quantity is not None and which.any():
             last = np.minimum(ends.values, block.needed(np.where(

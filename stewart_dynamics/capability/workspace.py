@@ -11,7 +11,7 @@ and conics. The boundary of the section are the parts of these curves where all 
 kept: holes stay holes. Where circles cross is known in closed form, so no arc is missed; where an
 arc crosses another limit is found by bisection. An arc of a conic, however short, begins and ends
 where an arc found before ends on it. Boundaries at singularities and at the clearance of the legs
-are found on a grid.
+are found on a grid; where drives move the anchors of legs on circles, all boundaries are.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.legs.lines import AnchorCircles
+from stewart_dynamics.mechanics.batch import drive_positions
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.limits import (
     BASE_ANGLE_MAX, CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, Limits, OF_JOINTS, short_name,
@@ -80,6 +82,9 @@ def section(platform: StewartPlatform, axes: Array, start: Motion, normal: int) 
     normal: index of the base axis that is normal to the plane.
     """
     plane = _Plane(platform, start, normal)
+    if plane.circles is not None:
+        found = [*plane.edges_of_circles(plane.circles)]
+        return Section(tuple(found), tuple(_joined([each.points for each in found])))
     curves = list(_curves(platform, axes, start, normal))
     circles = [each for name, leg, curve, crossings in curves if not callable(crossings)
                for each in plane.parts(name, leg, curve, crossings)]
@@ -103,7 +108,9 @@ class _Plane:
         # all lengths are within this range
         p = platform.parameters
         tips = p.geometry.base_joints - p.geometry.platform_joints @ start.rotation.T
-        longest = self._limits.limits.bounds[LENGTH_MAX][:, None]
+        self.circles = circles = p.leg_kind.anchor_circles(p)
+        longest = (self._limits.limits.bounds[LENGTH_MAX] if circles is None
+                   else circles.radii + circles.lengths)[:, None]
         self._low, self._high = (tips - longest).max(axis=0), (tips + longest).min(axis=0)
         self._side = float(platform.solve(start.rows[None])[0, DETERMINANT])
 
@@ -120,7 +127,7 @@ class _Plane:
         """Return at which positions (N, 3) lengths and angles of the joints keep their limits."""
         kept: Flags = np.asarray(np.isfinite(points).all(axis=1))
         rows = self._rows(points[kept])
-        values = self._limits.lengths_and_angles(rows, self._platform.solve(rows))
+        values = self._limits.drives_and_joints(rows, self._platform.solve(rows))
         kept[kept] = ~self._limits.exceeded(values, len(rows))
         return kept
 
@@ -175,6 +182,40 @@ class _Plane:
             if self.within(piece).all() and self.regular(piece).all():
                 leg = int(clearance(self._rows(piece[:1]))[0].argmin())
                 yield Boundary(short_name(CLEARANCE_MIN), leg, piece)
+
+    def edges_of_circles(self, circles: AnchorCircles) -> Iterator[Boundary]:
+        """Yield the whole boundary where drives move anchors on circles, on a grid."""
+        def kept(points: Array) -> Flags:
+            good = self.within(points)
+            good[good] = self.regular(points[good])
+            return good
+
+        pieces = np.array(list(self._edges(kept))).reshape(-1, 2, 3)
+        if not len(pieces):
+            return
+        excesses = self._excesses(circles, pieces[:, 0])
+        names = list(excesses)
+        nearest = np.abs(np.stack(list(excesses.values()), axis=1)).reshape(len(pieces), -1)
+        which = nearest.argmin(axis=1)
+        on = nearest[np.arange(len(pieces)), which] < _ON
+        for column in np.unique(np.where(on, which, -1)).tolist():
+            name, leg = (SINGULARITY, -1) if column < 0 else (
+                short_name(names[column // 6]), column % 6)
+            yield from _chained(Boundary(name, leg, piece) for piece in pieces[
+                (which == column) & on if column >= 0 else ~on])
+
+    def _excesses(self, circles: AnchorCircles, points: Array) -> dict[str, Array]:
+        """Return by how much limits of drives and joints are exceeded at positions (N, 6)."""
+        rows = self._rows(points)
+        bounds = self._limits.limits.bounds
+        found = {name: each - bounds[name] for name, each in self._limits.drives_and_joints(
+            rows, self._platform.solve(rows)).items()}
+        kind = self._platform.parameters.leg_kind
+        positions = drive_positions(self._platform.structure, rows)
+        offsets = np.remainder(positions - circles.middles + math.pi, 2.0 * math.pi) - math.pi
+        ends = zip(circles.limits, (offsets, -offsets), strict=True)
+        return {name: each for name, each in found.items() if name not in kind.position_limits} | {
+            name: each - circles.halves for name, each in ends if name in found}
 
     def _edges(self, kept: Callable[[Array], Flags]) -> Iterator[Array]:
         """Yield pieces (2, 3) of the boundary of a condition, between lines of a grid."""

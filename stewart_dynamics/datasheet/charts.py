@@ -21,7 +21,8 @@ _WIDTH = 340.0
 # Dashes of a boundary by the limit that it is, before its color by the leg.
 DASHES = {'length_max': None, 'length_min': '6 3', 'base_joint_angle_max': '2 2.5',
           'platform_joint_angle_max': '9 2 2 2', 'leg_clearance_min': '4 2 1 2 1 2',
-          'singularity': '1 3'}
+          'singularity': '1 3', 'angle_max': None, 'angle_min': '6 3',
+          'lever_min': '4 2 1 2 1 2'}
 # Largest number of names of curves in a line.
 _IN_ROW = 3
 # Dashes of curves in one chart, in the order in which they are drawn.

@@ -53,6 +53,7 @@ class Order(NamedTuple):
     recording: Options = Options()
     leg_stiffness: float | None = None
     stuck: int | None = None  # index of a leg
+    torque_unit: str = 'Nm'  # of the drives' torques on the page, one of TORQUES
 
 
 class Progress(NamedTuple):
@@ -97,9 +98,12 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
         hexapod, order.leg_stiffness, ranges, _LEVELS)
     sheet['stuck_leg'] = None if order.stuck is None else ratings.stuck_leg(
         hexapod, order.stuck)
+    drives = ratings.drives(hexapod, ranges, _LEVELS)
+    if drives is not None:
+        sheet['drives'] = drives
     progress.stage('workspace')
     sections = {name: hexapod.section(normal) for name, normal in zip(
-        workspace.PLANES, 'yxz', strict=True) if hexapod.limited('length_max')}
+        workspace.PLANES, 'yxz', strict=True) if hexapod.has_sections}
     modes = {} if order.leg_stiffness is None else {
         name: workspace.frequencies(hexapod, each, workspace.PLANES[name], order.leg_stiffness)
         for name, each in sections.items()}
@@ -122,7 +126,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     with whole_folder(folder, options, DATASHEET, before) as partial:
         write_json(partial / DATASHEET, sheet)
         write_files({partial / WORKSPACE: workspace.table(sections, tilts, hexapod)})
-        write_page(partial / DATASHEET_PAGE, sheet, hexapod, pictures)
+        write_page(partial / DATASHEET_PAGE, sheet, hexapod, pictures, order.torque_unit)
     return sheet
 
 
@@ -211,7 +215,8 @@ def check_order(order: Order, parameters: Parameters) -> None:
     if order.payload is not None and not order.payload.mass > 0.0:
         raise StewartError(f'--payload: mass {order.payload.mass:g} kg: must be above 0')
     if order.leg_stiffness is not None and not order.leg_stiffness > 0.0:
-        raise StewartError(f'--leg-stiffness: {order.leg_stiffness:g} N/m: must be above 0')
+        raise StewartError(f'--leg-stiffness: {order.leg_stiffness:g} '
+                           f'{parameters.leg_kind.stiffness_unit}: must be above 0')
 
 
 def leg_of(name: str, parameters: Parameters) -> int:
@@ -225,6 +230,13 @@ def leg_of(name: str, parameters: Parameters) -> int:
 def soft_legs(parameters: Parameters, stiffness: float | None) -> Iterator[str]:
     """Yield a likely mistake in the stiffness of the legs [N/m]: its unit."""
     mass = parameters.carried.mass
-    if stiffness is not None and 6.0 * stiffness < mass * (2.0 * math.pi * _SLOWEST) ** 2:
+    circles = parameters.leg_kind.anchor_circles(parameters)
+    if circles is not None:
+        if stiffness is not None and 6.0 * stiffness / float(circles.radii.min()) ** 2 < mass * (
+                2.0 * math.pi * _SLOWEST) ** 2:
+            yield (f'--leg-stiffness: {stiffness:g} {parameters.leg_kind.stiffness_unit}: six '
+                   f'such drives and {mass:.3g} kg have a natural frequency below {_SLOWEST:g} '
+                   'Hz: in N m/deg, or in N m/mrad?')
+    elif stiffness is not None and 6.0 * stiffness < mass * (2.0 * math.pi * _SLOWEST) ** 2:
         yield (f'--leg-stiffness: {stiffness:g} N/m: six such legs and {mass:.3g} kg have a '
                f'natural frequency below {_SLOWEST:g} Hz: in N/um, or in N/mm?')

@@ -45,8 +45,11 @@ def _arguments() -> argparse.ArgumentParser:
                         help='mass on the platform, and its center of mass in the platform frame '
                              '[m]')
     parser.add_argument('--leg-stiffness', type=between(-1e15, 1e15), metavar='K',
-                        help='stiffness of a leg along its axis [N/m]: adds stiffness and natural '
-                             'frequencies')
+                        help='stiffness of a leg along its axis [N/m], or of its drive where '
+                             'that turns [N m/rad]: adds stiffness and natural frequencies')
+    parser.add_argument('--torque-unit', choices=('Nm', 'kgcm'), default='Nm',
+                        help='unit of the torques of drives on the page: N m, or kg cm as hobby '
+                             'servos are sold (default: %(default)s)')
     parser.add_argument('--stuck', metavar='LEG',
                         help='name of a leg that keeps its length: the motions that remain, and '
                              'the loads they can hold')
@@ -78,7 +81,6 @@ def _run(given: argparse.Namespace) -> int:
         check_order, is_possible, leg_of, Order, Progress, soft_legs, STAGES, write_datasheet)
     from stewart_dynamics.datasheet.datasheet_text import sheet_text
     from stewart_dynamics.datasheet.rated_hexapod import Payload
-    from stewart_dynamics.legs import require_kind
     from stewart_dynamics.mechanics.frames.motion import Pose
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes, mistakes_in_options
     from stewart_dynamics.parameters.table import Parameters
@@ -91,7 +93,6 @@ def _run(given: argparse.Namespace) -> int:
         force=given.force,
         topics={'combined': given.combined} if given.combined else {})
     parameters = Parameters.from_yaml(given.params, given.node)
-    require_kind(parameters, 'capability')
     order = Order(
         given.params.stem if given.node == NODE else given.node.rpartition('/')[2],
         None if given.pose is None else Pose.from_euler(given.pose[:3], given.pose[3:]),
@@ -99,7 +100,8 @@ def _run(given: argparse.Namespace) -> int:
         None if given.payload is None else Payload(
             given.payload[0], np.array(given.payload[1:])),
         None if given.box is None else read_box(given.box, parameters), given.motion, options,
-        given.leg_stiffness, None if given.stuck is None else leg_of(given.stuck, parameters))
+        given.leg_stiffness, None if given.stuck is None else leg_of(given.stuck, parameters),
+        given.torque_unit)
     check_order(order, parameters)
     check_free(given.output, options, DATASHEET)
     remove_abandoned([given.output])

@@ -18,9 +18,8 @@ from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, both_payloads, both_ways, box_verdict, DEGREE, down, limit_name, LINEAR, MM,
-    motion_verdict, numbers, payloads_in_words, possible, rated_payload, setpoints_used, span,
-    stuck_rows,
-    unit_of)
+    motion_verdict, numbers, OF_DRIVES, payloads_in_words, possible, rated_payload,
+    setpoints_used, span, stuck_rows, TORQUES, Unit, unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
 from stewart_dynamics.datasheet.pose_ratings import AXES, grid, Payloads, poses_of
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
@@ -28,7 +27,7 @@ from stewart_dynamics.datasheet.rated_workspace import (
     Boundary, Frequencies, PLANES, rotations_over_height)
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.parameters.table import inertia_matrix, PARAMETERS
-from stewart_dynamics.reporting.pages import link_to_other, page
+from stewart_dynamics.reporting.pages import digits, link_to_other, number, page
 from stewart_dynamics.reporting.results_folder import REPLAYS, REPORT_PAGE
 from stewart_dynamics.reporting.vector_picture import Picture
 from stewart_dynamics.whole_file import write_files
@@ -111,8 +110,8 @@ class Pictures(NamedTuple):
 
 
 def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pictures: Pictures,
-               ) -> None:
-    """Write datasheet.html, with the content of datasheet.json."""
+               torque_unit: str) -> None:
+    """Write datasheet.html, with the content of datasheet.json; torque_unit: one of TORQUES."""
     drawing = pictures.drawing()
     bag = Path(sheet['motion']['bag']) if sheet['motion'] else Path()
     name = (bag if bag.is_dir() else bag.with_suffix('')).name
@@ -120,7 +119,10 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         _FOLDER, 'datasheet', document=True, s=sheet, key_figures=_key_figures(sheet, hexapod),
         summary=_summary(hexapod), legs=hexapod.joints, travel=_travel(sheet, hexapod),
         rates=_rates(sheet, hexapod), loads=_loads(sheet, hexapod), stiffness=_stiffness(sheet),
-        joints=_joints(hexapod), properties=_properties(sheet, hexapod),
+        drive_heads=_drive_heads(sheet, hexapod, torque_unit),
+        joints=_joints(sheet, hexapod, torque_unit),
+        properties=_properties(sheet, hexapod, torque_unit), drive_unit=_drive_unit(hexapod),
+        position=hexapod.given.leg_kind.position.name,
         verdicts=[(name.capitalize(), found, words(found)) for name, words in (
             ('motion', motion_verdict), ('box', box_verdict)) if (found := sheet[name])],
         report=link_to_other(path, [
@@ -164,6 +166,9 @@ def _key_figures(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[
             any_orientation, value = rated_payload(sheet, payload)
             found.append((f'Payload{kind and f", {kind}"}{any_orientation}', down(value), 'kg'))
         found.append(('Force, every direction', down(sheet['force']['every_direction']), 'N'))
+    if 'drives' in sheet and sheet['drives']['worst_lever']:
+        found.append(('Lever, smallest', down(100.0 * sheet['drives']['worst_lever']['value']),
+                      '%'))
     if sheet['velocity'] is not None:
         found.append(('Velocity Z', both_ways(sheet['velocity'], 'z', LINEAR['velocity']), 'mm/s'))
     return found
@@ -263,20 +268,59 @@ def _stiffness(sheet: Mapping[str, Any]) -> list[dict[str, Any]]:
     return rows
 
 
-def _joints(hexapod: RatedHexapod) -> list[dict[str, Any]]:
-    """Return a row for each leg: joints in mm, and its limits."""
-    p = hexapod.given
-    lengths = hexapod.platform.inverse_kinematics(hexapod.pose)
-    return [{
-        'leg': name, 'base': 1e3 * p.geometry.base_joints[n],
-        'platform': 1e3 * p.geometry.platform_joints[n], 'length': 1e3 * float(lengths[n]),
-        'range': ' to '.join('–' if p[limit] is None else f'{1e3 * p[limit][n]:.6g}' for limit in (
-            'limits.length_min', 'limits.length_max'))} for n, name in enumerate(hexapod.joints)]
+def _drive_unit(hexapod: RatedHexapod) -> Unit:
+    """Return the unit of the stiffness of a drive."""
+    return OF_DRIVES[hexapod.given.leg_kind.stiffness_unit]
 
 
-def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[str, str]]:
+def _position_unit(hexapod: RatedHexapod) -> Unit:
+    return {'m': MM, 'rad': DEGREE}[hexapod.given.leg_kind.position.unit]
+
+
+def _drive_heads(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: str) -> list[str]:
+    """Return the heads of the columns of the drives."""
+    kind, unit = hexapod.given.leg_kind, _position_unit(hexapod).name
+    heads = [f'{kind.position.name} [{unit}]', f'range [{unit}]']
+    if 'drives' in sheet:
+        heads += ['lever [%]', f'{kind.effort.name} at rest [{TORQUES[torque_unit].name}]']
+    return heads
+
+
+def _joints(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: str,
+            ) -> list[dict[str, Any]]:
+    """Return a row for each leg: joints in mm, and its drive with its range."""
+    p, unit, rows = hexapod.given, _position_unit(hexapod), []
+    positions = hexapod.platform.inverse_kinematics(hexapod.pose)
+    for n, name in enumerate(hexapod.joints):
+        shown = round(unit.factor * float(positions[n]), 1) + 0.0  # no -0
+        cells = [number(shown, 1), ' to '.join(
+            '–' if p[limit] is None else f'{unit.factor * p[limit][n]:.6g}'.replace('-', '−')
+            for limit in p.leg_kind.position_limits)]
+        if 'drives' in sheet:
+            drives = sheet['drives']
+            cells += [number(100.0 * float(drives['lever_ratios'][n]), 1), digits(
+                TORQUES[torque_unit].factor * float(drives[p.leg_kind.effort.field][n]))]
+        rows.append({'leg': name, 'base': 1e3 * p.geometry.base_joints[n],
+                     'platform': 1e3 * p.geometry.platform_joints[n], 'drive': cells})
+    return rows
+
+
+def _in_unit(value: Any, unit: str, torque_unit: str) -> str:
+    """Return numbers of a parameter with their unit, angles in degrees."""
+    if unit == 'rad':
+        return numbers(value, DEGREE.factor, DEGREE.name)
+    if unit == 'N m':
+        unit = TORQUES[torque_unit].name
+        return numbers(value, TORQUES[torque_unit].factor, f' {unit}')
+    return numbers(value, 1.0, f' {unit}'.rstrip())
+
+
+def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: str,
+                ) -> list[tuple[str, str]]:
     """Return names and values of the other parameters that the figures rest on."""
     p = hexapod.given
+    kind = p.leg_kind
+    reflected = kind.fields['reflected_mass']
     inertia = inertia_matrix(p.carried.inertia)
 
     rows = [
@@ -289,21 +333,20 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[s
         ('Platform' + (' with payload' if p.payload.mass > 0.0 else ''),
          f'{p.carried.mass:.5g} kg at {numbers(p.carried.center, 1e3, " mm")}'),
         ('Its inertia, xx yy zz', numbers(np.diagonal(inertia), 1.0, ' kg m²')),
-        ('Leg: cylinder, piston', f'{numbers(p.legs.cylinder.mass)}, '
-         f'{numbers(p.legs.piston.mass, 1.0, " kg")}'),
-        ('Reflected mass of an actuator', numbers(p.actuator.reflected_mass, 1.0, ' kg')),
+        (f'Leg: {", ".join(kind.bodies)}',
+         f'{", ".join(numbers(p[name]) for name in kind.bodies.values())} kg'),
+        (f'{reflected.rpartition(".")[2].replace("_", " ").capitalize()} of an actuator',
+         numbers(p[reflected], 1.0, f' {kind.inertia_unit.replace("^2", "²")}')),
         ('Gravity', numbers(p.gravity, 1.0, ' m/s²'))]
     for name, value in p.items():
         if name.startswith('limits.') and name != 'limits.action' and value is not None and (
-                not name.startswith('limits.length_m')):
-            unit = PARAMETERS[name].unit
-            rows.append((name, numbers(value, DEGREE.factor, DEGREE.name) if unit == 'rad' else
-                         numbers(value, 1.0, f' {unit}')))
+                name not in kind.position_limits):
+            rows.append((name, _in_unit(value, PARAMETERS[name].unit, torque_unit)))
     if p.drives:
         for name, value in p.items():
             if value is not None and (name.startswith('drive.') or name == 'actuator.screw_lead'):
                 unit = PARAMETERS[name].unit.replace('^2', '²')
-                rows.append((name, numbers(value, 1.0, f' {unit}'.rstrip())
+                rows.append((name, _in_unit(value, unit, torque_unit)
                              if isinstance(value, np.ndarray) else str(value)))
     if sheet['leg_clearance'] is not None:
         rows.append(('Clearance between legs at the pose',

@@ -18,7 +18,7 @@ import numpy as np
 
 from stewart_dynamics.datasheet.pose_ratings import AXES
 from stewart_dynamics.mechanics.limits import (
-    LIMITS, OF_POSES, short_name, SINGULARITY, TORQUE_CONTINUOUS)
+    LIMITS, POSE, short_name, SINGULARITY, TORQUE_CONTINUOUS)
 from stewart_dynamics.parameters.table import FIXED
 from stewart_dynamics.reporting.pages import MOST_PLAIN, typeset
 
@@ -37,8 +37,11 @@ class Unit(NamedTuple):
 
 MM, DEGREE = Unit('mm', 1e3), Unit('°', math.degrees(1.0))
 # Units in which the excesses of limits are written.
-_OF_LIMITS = {short_name(limit): {'m': MM, 'rad': DEGREE}[LIMITS[limit].quantity.unit]
-              for limit in OF_POSES}
+_OF_LIMITS = {short_name(name): {'m': MM, 'rad': DEGREE, '': Unit('', 1.0)}[limit.quantity.unit]
+              for name, limit in LIMITS.items() if limit.depends == POSE}
+# Units in which stiffnesses and torques of drives are written.
+OF_DRIVES = {'N/m': Unit('N/µm', 1e-6), 'N m/rad': Unit('N m/mrad', 1e-3)}
+TORQUES = {'Nm': Unit('N m', 1.0), 'kgcm': Unit('kg cm', 100.0 / 9.80665)}
 LINEAR = {'travel': MM, 'velocity': Unit('mm/s', 1e3), 'acceleration': Unit('m/s²', 1.0),
           'force': Unit('N', 1.0), 'stiffness': Unit('N/µm', 1e-6)}
 ANGULAR = {'travel': DEGREE, 'velocity': Unit('°/s', DEGREE.factor),
@@ -259,4 +262,4 @@ def _exceeded(found: dict[str, Any]) -> str:
     if found['limit'] == SINGULARITY:
         return f'{limit}: condition number exceeded by {down(excess)}'
     unit = _OF_LIMITS[found['limit']]
-    return f'{limit} exceeded by {down(excess * unit.factor)} {unit.name}'
+    return f'{limit} exceeded by {down(excess * unit.factor)} {unit.name}'.rstrip()

@@ -83,6 +83,10 @@ class Drawing:
         self._arms = np.asarray(parameters.geometry.platform_joints)
         self._base = np.asarray(parameters.geometry.base_joints) @ self._upright.T
         self._platform = self._placed(pose, self._arms)
+        lines = parameters.leg_kind.lines(parameters, pose.position, pose.rotation)
+        # the begin of each line of force, where drives move it
+        self._anchors = None if lines.path is None else (
+            self._platform - lines.lengths[:, None] * lines.directions @ self._upright.T)
         self._pivot: Array = np.empty((0, 3))
         if pivot is not None and np.any(pivot):
             self._pivot = self._placed(pose, pivot[None])
@@ -155,8 +159,8 @@ class Drawing:
                 ) -> _Place:
         """Return the place of a view, at the largest scale at which some views fit."""
         points = np.concatenate([
-            self._base, self._base_plate, self._platform, self._pivot,
-            *map(self._moving_plate, self._poses)])
+            self._base, *([] if self._anchors is None else [self._anchors]), self._base_plate,
+            self._platform, self._pivot, *map(self._moving_plate, self._poses)])
         room = np.array([picture.width - margins.sides, picture.height - margins.top
                          - margins.bottom])
         spans = [np.ptp(each.of(points), axis=0) + _PLATE * self._size for each in views]
@@ -184,12 +188,13 @@ class Drawing:
             length = float(np.linalg.norm(end - begin))
             retracted = length if shortest is None else float(shortest[n])
             cylinder = begin + (end - begin) * min(_OF_LEG * retracted / length, 1.0)
-            a, b, c = place(view.of(np.array([begin, cylinder, end])))
-            picture.line(a, c, css=f'piston leg{n}', stroke_width=max(
-                2.0 * radii[1][n] * place.scale, 1.5))
+            middle = cylinder if self._anchors is None else self._anchors[n]
+            a, b, c = place(view.of(np.array([begin, middle, end])))
+            picture.line(a if self._anchors is None else b, c, css=f'piston leg{n}',
+                         stroke_width=max(2.0 * radii[1][n] * place.scale, 1.5))
             picture.line(a, b, css=f'cylinder leg{n}', stroke_width=max(
                 2.0 * radii[0][n] * place.scale, 3.0))
-            for joint in (a, c):
+            for joint in (a, c) if self._anchors is None else (a, b, c):
                 picture.circle(joint, 2.6, css='joint')
         for _, points, css in plates[1:]:
             picture.path(hull(place(view.of(points))), closed=True, css=css)

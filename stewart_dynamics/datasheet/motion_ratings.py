@@ -13,7 +13,9 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.datasheet.pose_ratings import answer
-from stewart_dynamics.errors import MotionError
+from stewart_dynamics.errors import MotionError, ParameterError
+from stewart_dynamics.legs.kind import LegKind
+from stewart_dynamics.legs.lines import AnchorCircles
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
@@ -40,12 +42,16 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
         recorded.motion, recorded.wrench, recorded.base, singular='nan')
     found: dict[str, Array] = {}
     low, high = p.limits.length_min, p.limits.length_max
-    if high is not None:
+    circles, kind = p.leg_kind.anchor_circles(p), p.leg_kind
+    if circles is not None:
+        found |= _of_circles(circles, kind, kind.lever_ratios(p, result.rows), result.rows)
+    elif high is not None:
         shortest = np.zeros(6) if low is None else low
         found[LENGTH] = np.abs(2.0 * result.lengths - high - shortest) / (high - shortest)
     elif low is not None:
         found[LENGTH] = low / result.lengths
-    for limit in (*limits.OF_RATES, *limits.OF_LOADS):
+    known = limits.limits_of(p)
+    for limit in (*known.rates, *known.loads):
         if p[limit] is not None:
             values = np.abs(result.rows[..., limits.LIMITS[limit].columns])
             found[limits.LIMITS[limit].quantity.name] = np.where(
@@ -57,10 +63,10 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
             found[SPEED] = speeds
         if motors.limited:
             found[TORQUE] = np.where(np.isfinite(torques), torques, np.inf)
-    known = [name for name in limits.OF_JOINTS if p[name] is not None]
-    if known:
+    of_joints = [name for name in limits.OF_JOINTS if p[name] is not None]
+    if of_joints:
         angles = dict(zip(limits.OF_JOINTS, platform.joint_angles(recorded.motion), strict=True))
-        found[ANGLE] = np.max([angles[name] / p[name] for name in known], axis=0)
+        found[ANGLE] = np.max([angles[name] / p[name] for name in of_joints], axis=0)
     clearances, least = clearance_to_check(p), p.limits.leg_clearance_min
     if clearances is not None and least is not None:
         distances = clearances(recorded.motion.rows)
@@ -70,6 +76,21 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
     condition = result.condition_number / stop_condition_of(p)
     crossed = np.diff(np.sign(result.determinant), prepend=np.sign(result.determinant[0])) != 0.0
     found[SINGULARITY] = np.where(crossed, np.inf, condition)
+    return found
+
+
+def _of_circles(circles: AnchorCircles, kind: LegKind, ratios: Array, rows: Array,
+                ) -> dict[str, Array]:
+    """Return the use of positions and levers (N, 6) of drives whose anchors move on circles."""
+    found: dict[str, Array] = {}
+    if np.isfinite(circles.halves).any():
+        offsets = np.remainder(
+            rows[..., kind.position.columns] - circles.middles + np.pi, 2.0 * np.pi) - np.pi
+        used = np.abs(offsets) / circles.halves
+        found[kind.position.name] = np.where(np.isfinite(used), used, np.inf)
+    if circles.least.any():
+        with np.errstate(divide='ignore'):
+            found['lever'] = np.where(ratios > 0.0, circles.least / ratios, np.inf)
     return found
 
 
@@ -124,7 +145,7 @@ def _between(capability: Capability, recorded: RecordedMotion, joints: Any) -> d
         base = None if recorded.base is None else BaseMotion.of_rows(recorded.base.rows[0])
         try:
             found = capability.speed_factor(recorded.motion, recorded.wrench[0], base, times)
-        except MotionError as exc:
+        except (MotionError, ParameterError) as exc:
             reason = str(exc)
         else:
             return _named('factor', found, recorded, joints) | {

@@ -32,20 +32,19 @@ class Payloads:
     """
 
     def __init__(self, capability: Capability, poses: Pose, continuous: bool = False) -> None:
-        platform = capability.platform
-        self._gravity = np.asarray(platform.parameters.gravity)
+        self._gravity = np.asarray(capability.platform.parameters.gravity)
         # of a gravity of 1 along each axis: loads of the hexapod, (N, 3, RESULT), and of a mass of
         # 1 kg, itself and its first moment, (N, 3, 4, RESULT)
         along = np.eye(3)
-        own = platform.inverse_dynamics(
-            Motion.from_pose(poses[:, None]), base=BaseMotion(along)).rows
+        own = capability.load_rows(
+            Motion.from_pose(poses[:, None]), base=BaseMotion(along))
         arms = np.concatenate([np.zeros((len(poses), 1, 3)),
                                np.swapaxes(poses.rotation, 1, 2)], axis=1)[:, None]
         weights = np.zeros((len(poses), 3, 4, 6))
         weights[..., 0, :3] = along
         weights[..., 3:] = np.cross(arms, along[:, None])
-        added = platform.inverse_dynamics(
-            Motion.from_pose(poses[:, None, None]), weights, BaseMotion(np.zeros(3))).rows
+        added = capability.load_rows(
+            Motion.from_pose(poses[:, None, None]), weights, BaseMotion(np.zeros(3)))
         self._loads = [
             (np.swapaxes(own[..., columns], 1, 2), np.moveaxis(added[..., columns], -1, 1), most)
             for columns, most in capability.holding_loads(continuous)]
@@ -167,6 +166,30 @@ def _held(hexapod: RatedHexapod, poses: Pose, continuous: bool) -> dict[str, Any
     found['payload']['any_orientation'] = (
         Payloads(c, poses, continuous).any_orientation()
         if hexapod.given['gravity'].any() else None)
+    return found
+
+
+def drives(hexapod: RatedHexapod, ranges: Array | None, levels: int) -> dict[str, Any] | None:
+    """
+    Return positions, levers and efforts of the drives at rest at the pose; None without levers.
+
+    Levers are by their largest values. The worst lever is the smallest over a grid of a box of
+    ranges (6, 2).
+    """
+    p = hexapod.given
+    kind = p.leg_kind
+    if not kind.lever_limit:
+        return None
+    rows = hexapod.platform.inverse_dynamics(Motion.from_pose(hexapod.pose)).rows
+    found: dict[str, Any] = {
+        kind.position.field: rows[kind.position.columns], kind.effort.field: rows[
+            kind.effort.columns], 'lever_ratios': kind.lever_ratios(p, rows), 'worst_lever': None}
+    if ranges is not None:
+        poses = poses_of(hexapod, grid(ranges, levels))
+        ratios = kind.lever_ratios(p, hexapod.platform.inverse_dynamics(
+            Motion.from_pose(poses)).rows)
+        leg = int(ratios.min(axis=0).argmin())
+        found['worst_lever'] = {'value': float(ratios.min()), 'leg': hexapod.joints[leg]}
     return found
 
 

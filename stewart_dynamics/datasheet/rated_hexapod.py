@@ -15,14 +15,15 @@ from stewart_dynamics.capability.capability import Capability, Extent
 from stewart_dynamics.capability.reachable import Reachable
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
+from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.dynamics.linear_parameters import with_point_mass
 from stewart_dynamics.mechanics.frames.motion import motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_rotation_vector, to_quaternion
-from stewart_dynamics.mechanics.limits import OF_LEGS
+from stewart_dynamics.mechanics.limits import limits_of
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.mechanics.stiffness import HELD_MOTORS
+from stewart_dynamics.mechanics.stiffness import held_motors
 from stewart_dynamics.parameters.table import LEG_SHAPE, Parameters, PLATFORM_OUTLINE
 from stewart_dynamics.planned.interpolation import rotation_vector
 
@@ -59,8 +60,9 @@ class RatedHexapod:
 
     def __init__(self, parameters: Parameters, pose: Pose | None = None,
                  pivot: Array | None = None, payload: Payload | None = None) -> None:
-        if all(parameters[name] is None for name in OF_LEGS):
-            raise ParameterError(f'parameters: {", ".join(OF_LEGS)}: none of them is set: without '
+        known = limits_of(parameters).legs
+        if all(parameters[name] is None for name in known):
+            raise ParameterError(f'parameters: {", ".join(known)}: none of them is set: without '
                                  'a limit there is no datasheet')
         self.pivot = np.zeros(3) if pivot is None else np.asarray(pivot, dtype=float)
         self.given = parameters if payload is None else with_point_mass(
@@ -80,9 +82,11 @@ class RatedHexapod:
         names: tuple[str, ...] = self.given['joints']
         return names
 
-    def limited(self, name: str) -> bool:
-        """Return whether a limit is given."""
-        return self.given[f'limits.{name}'] is not None
+    @property
+    def has_sections(self) -> bool:
+        """Return whether sections of the workspace end on all sides."""
+        p = self.given
+        return p.limits.length_max is not None or p.leg_kind.anchor_circles(p) is not None
 
     def travel(self, poses: Pose, directions: Array) -> Extent:
         """Return ``Capability.travel`` from poses of the pivot."""
@@ -103,13 +107,14 @@ class RatedHexapod:
 
     @cached_property
     def _held(self) -> Capability:
-        return Capability(StewartPlatform(self.platform.parameters.replaced(HELD_MOTORS)))
+        return Capability(StewartPlatform(self.platform.parameters.replaced(
+            held_motors(self.given))))
 
     def frequencies(self, poses: Pose, leg_stiffness: float) -> Array:
         """
         Return (..., 6) natural frequencies [Hz] at poses of the pivot, with held motors.
 
-        A leg's stiffness [N/m] is between its motor and the platform, so rotors stand still.
+        A leg's stiffness is between its motor and the platform, so rotors stand still.
         """
         return self._held.modes(poses, leg_stiffness).frequencies
 
@@ -135,6 +140,7 @@ class RatedHexapod:
         """Raise where a limit is exceeded at the pose already."""
         known, motions = PoseLimits(self.given), motion_rows(pose)
         results = whole.solve(motions)
+        batch.find_unreachable(whole.structure, self.joints, motions, results, ())
         condition, stop = float(results[0, CONDITION]), known.stop_condition
         if not condition < stop:
             raise SingularityError(

@@ -18,7 +18,7 @@ from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.core.binding import header, places
 from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.export.golden_vectors import (
-    columns_of, golden_vectors, parts_of, result_columns, RESULT_COLUMNS, whole_columns)
+    columns_of, golden_vectors, parts_of, RESULT_COLUMNS, result_columns, whole_columns)
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS

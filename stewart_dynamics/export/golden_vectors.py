@@ -129,7 +129,7 @@ def golden_vectors(parameters: Parameters) -> Array:
             continue
         code, steps, residual = np.empty(1, dtype=int), np.empty(1, dtype=int), np.empty(1)
         forward_kinematics.poses(
-            hexapod, outputs.drive_positions.copy(), guess, code, steps, residual)
+            hexapod, outputs.rows[:, kind.position.columns].copy(), guess, code, steps, residual)
         rows.append([
             stamp, moving, *motions[n], *wrenches[n], *bases[n], *_results(kind, outputs),
             *_commanded(outputs), *_motors(drives, motions[n:n + 1], outputs), int(code[0]),

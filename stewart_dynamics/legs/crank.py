@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
 from stewart_dynamics.legs.kind import (
     AtHome, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import (
-    AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
+    AnchorCircles, AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
 from stewart_dynamics.legs.tree import BARREL, LegBranch, ROD
 
@@ -32,6 +33,7 @@ COULOMB_VELOCITY = 0.01
 """Default of ``actuator.coulomb_velocity`` for cranks [rad/s]."""
 HEADINGS, AXES, DIRECTIONS = (
     'geometry.crank_angles', 'geometry.crank_axes', 'geometry.crank_directions')
+_LEVERS = places('stewart_result')['levers']
 # A stop near a dead centre is expected to end motions before half of its lever, or before this.
 _DEEPEST = 0.5
 _LEAST_LEVER = 0.01
@@ -49,6 +51,7 @@ class Crank(LegKind):
     extremes = 'smallest angle', 'largest angle'
     position_limits = 'limits.angle_min', 'limits.angle_max'
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
+    lever_limit, ends_differ = 'limits.lever_min', True
     joint_force, joint_force_limit = 'rod_force', 'limits.rod_force_max'
     commands = 'torques'
     simulated = 'leg_torque'
@@ -62,7 +65,7 @@ class Crank(LegKind):
     width = places('stewart_result')['levers'].stop
     own = ('legs.crank.', 'legs.rod.', 'geometry.crank_', 'actuator.reflected_inertia',
            'limits.angle_', 'limits.speed_max', 'limits.torque_max', 'limits.rod_force_max',
-           'limits.lever_min', 'servo.', 'noise.angle', 'noise.speed', 'noise.torque')
+           'limits.lever_min', 'noise.angle', 'noise.speed', 'noise.torque', 'servo.')
     fields = {
         'crank_length': 'legs.crank.length', 'rod_length': 'legs.rod.length',
         'crank_axis': AXES, 'crank_direction': DIRECTIONS, 'crank_mass': 'legs.crank.mass',
@@ -90,6 +93,7 @@ class Crank(LegKind):
     inertia_unit = 'kg m^2'
     reflected, rotors = 'N^2 J', 'rotor and gear'
     friction_units = 'N m s/rad', 'N m'
+    bodies = {'crank': 'legs.crank.mass', 'rod': 'legs.rod.mass'}
     alternatives = (HEADINGS,), (AXES, DIRECTIONS)
     units = {'actuator.viscous_friction': 'N m s/rad', 'actuator.coulomb_friction': 'N m',
              'actuator.coulomb_velocity': 'rad/s'}
@@ -165,6 +169,34 @@ class Crank(LegKind):
     def missing_distances(self, parameters: Parameters, position: Array, rotation: Array) -> Array:
         """Return how far each platform joint is from the nearest point that its rod reaches."""
         return _angle_of(parameters, position, rotation).missing
+
+    def anchor_circles(self, parameters: Parameters) -> AnchorCircles:
+        """
+        Return the circles of the ends of the cranks.
+
+        The angle is within pi of its middle: where one limit alone is given, that is the other
+        end of the range, past which the angle jumps over the limit.
+        """
+        legs: Any = parameters.structure['legs']
+        low, high = parameters.limits.angle_min, parameters.limits.angle_max
+        middle = np.zeros(6) if low is None or high is None else 0.5 * (low + high)
+        lowest = middle - math.pi if low is None else np.maximum(low, middle - math.pi)
+        highest = middle + math.pi if high is None else np.minimum(high, middle + math.pi)
+        half = 0.5 * (highest - lowest)
+        below, above = self.position_limits
+        u, z = crank_axes(parameters)
+        across = np.asarray(np.cross(u, z), dtype=float)
+        return AnchorCircles(
+            z, across, parameters['legs.crank.length'], parameters['legs.rod.length'],
+            legs['branch'].copy(), parameters['limits.lever_min'], 0.5 * (lowest + highest),
+            np.where(half < math.pi, half, math.inf),
+            (below if high is None else above, above if low is None else below))
+
+    def lever_ratios(self, parameters: Parameters, results: Array) -> Array:
+        """Return |k| / L1, or -1 where a rod does not reach."""
+        ratios = np.abs(results[..., _LEVERS]) / parameters['legs.crank.length']
+        reached: Array = np.where(np.isfinite(ratios), ratios, -1.0)
+        return reached
 
     def leg_mass(self, parameters: Parameters, at: Lines) -> Array:
         """Return M_i = I r r^T + m_ab (t r^T + r t^T) + m_b, q' = r . x', A' = t q', r = d / k."""
@@ -271,10 +303,7 @@ class Crank(LegKind):
             return iter(())
         legs: Any = parameters.structure['legs']
         position = crank_mistakes.above_motors(parameters, home)
-        both = np.empty((6, 2))
-        function('choose_branches')(
-            parameters.structure.copy(), np.concatenate([position, np.ravel(home.rotation)]),
-            legs['branch'].copy(), both)
+        both = _angles_of_branches(parameters, position, home.rotation)[2]
         angles = np.where(legs['branch'] > 0.0, both[:, 0], both[:, 1])
         return crank_mistakes.likely_mistakes(
             parameters, home, angles, at.levers(), crank_bodies(parameters))
@@ -294,11 +323,7 @@ class Crank(LegKind):
         if AUTO not in wanted:
             return False
         position, rotation = home()
-        hexapod: Any = parameters.structure.copy()
-        angles = np.empty((6, 2))
-        undecided = function('choose_branches')(
-            hexapod, np.concatenate([position, np.ravel(rotation)]),
-            np.array([_SIGNS[each] for each in wanted]), angles)
+        hexapod, undecided, angles = _angles_of_branches(parameters, position, rotation)
         missing = np.isnan(angles[:, 0]) & [each == AUTO for each in wanted]
         if missing.any():
             leg = int(np.argmax(missing))
@@ -507,6 +532,22 @@ def _complete_axes(parameters: Parameters, source: str) -> None:
             raise ParameterError(f'{source}: {name}: given as well as {HEADINGS}: leave out one '
                                  'of them')
         parameters._complete(name, value)
+
+
+def _angles_of_branches(parameters: Parameters, position: Array, rotation: Array,
+                        ) -> tuple[Any, int, Array]:
+    """
+    Return the structure () with the branches that a pose decides, and angles (6, 2) there.
+
+    Angles [rad] are those of the branches positive and negative, nan out of reach; between them
+    stands the answer of ``choose_branches`` in C: whether a branch is not decided.
+    """
+    hexapod: Any = parameters.structure.copy()
+    angles = np.empty((6, 2))
+    undecided: int = function('choose_branches')(
+        hexapod, np.concatenate([position, np.ravel(rotation)]),
+        np.array([_SIGNS[each] for each in _branches(parameters)]), angles)
+    return hexapod, undecided, angles
 
 
 CRANK = Crank()

@@ -20,7 +20,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import KINDS, places
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.legs.lines import Lines
+from stewart_dynamics.legs.lines import AnchorCircles, Lines
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, UNIVERSAL
 from stewart_dynamics.legs.tree import LegBranch
 
@@ -112,8 +112,12 @@ class LegKind(ABC):
         Limits of the drive's position, the smallest and the largest.
     rate_limit, effort_limit : str
         Limits of its rate, and of its effort, to which commands are clipped.
+    lever_limit : str
+        Limit of the smallest lever by its largest value; empty: levers do not change.
     joint_force, joint_force_limit : str
         Key of the force along the line in tables, and its limit.
+    ends_differ : bool
+        Whether this force differs between the ends of a leg: a result has the larger one.
     commands : str
         Field of ``stewart_output`` with the efforts to command.
     simulated : str
@@ -166,8 +170,10 @@ class LegKind(ABC):
     position_limits: tuple[str, str]
     rate_limit: str
     effort_limit: str
+    lever_limit: str = ''
     joint_force: str = 'joint_force'
     joint_force_limit: str
+    ends_differ: bool = False
     commands: str
     simulated: str
     resolved: str
@@ -195,11 +201,17 @@ class LegKind(ABC):
     reflected: str  # what it is, in a formula
     rotors: str  # and of which parts
     friction_units: tuple[str, str]  # viscous and Coulomb
+    bodies: Mapping[str, str]  # of a leg, and the parameters of their masses
 
     @property
     def number(self) -> int:
         """Return ``stewart_platform.leg_kind``."""
         return KINDS[self.name.upper()]
+
+    @property
+    def stiffness_unit(self) -> str:
+        """Return the unit of the stiffness of a drive."""
+        return f'{self.effort.unit}/{self.position.unit}'
 
     @property
     def published(self) -> slice:
@@ -266,6 +278,16 @@ class LegKind(ABC):
         """Return by how much each leg misses its platform joint (..., 6) [m]; None: never."""
         del parameters, position, rotation
         return None
+
+    def anchor_circles(self, parameters: Parameters) -> AnchorCircles | None:
+        """Return the circles of anchors whose lines have fixed lengths; None: they do not move."""
+        del parameters
+        return None
+
+    def lever_ratios(self, parameters: Parameters, results: Array) -> Array:
+        """Return levers by their largest values (..., 6); -1 where a leg does not reach."""
+        del parameters
+        return np.ones((*results.shape[:-1], 6))
 
     @abstractmethod
     def leg_mass(self, parameters: Parameters, at: Lines) -> Array:

@@ -41,6 +41,25 @@ class Lines(NamedTuple):
         return speeds, speeds * self.path.tangents
 
 
+class AnchorCircles(NamedTuple):
+    """
+    The circles on which drives carry the beginnings of lines of fixed lengths.
+
+    A(q) = center + radius (along cos q + across sin q), base frame. Of the two positions q that
+    have a platform joint at the end of the line, the sign of the lever gives one.
+    """
+
+    along: Array  # unit vectors (6, 3)
+    across: Array
+    radii: Array  # (6,) [m]
+    lengths: Array  # of the lines (6,) [m]
+    signs: Array  # of the levers (6,)
+    least: Array  # smallest ratios of levers to radii that are allowed (6,)
+    middles: Array  # middle of the allowed positions (6,)
+    halves: Array  # half of their range (6,); infinite: all are allowed
+    limits: tuple[str, str]  # limits past which positions are above and below
+
+
 def lines_from(anchors: Array, joints: Array, position: Array, rotation: Array) -> Lines:
     """Return the lines from anchors to platform joints, both (6, 3), in poses (...)."""
     arms = joint_arms(rotation, joints)

@@ -73,6 +73,7 @@ class Telescopic(LegKind):
     inertia_unit = 'kg'
     reflected, rotors = 'J (2 pi / lead)^2', 'rotor and screw'
     friction_units = 'N s/m', 'N'
+    bodies = {'cylinder': 'legs.cylinder.mass', 'piston': 'legs.piston.mass'}
 
     def write_fields(self, legs: Records, parameters: Parameters) -> None:
         """Write nothing: all fields hold parameters as they are."""

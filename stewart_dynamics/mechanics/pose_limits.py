@@ -18,9 +18,8 @@ from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, TORQUE_MAX,
-    TORQUE_SPEED)
-from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, LENGTHS
+    ANGLES, CLEARANCE_MIN, Exceedance, LIMITS, Limits, TORQUE_MAX, TORQUE_SPEED)
+from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT
 from stewart_dynamics.mechanics.singularity_warning import stop_condition_of
 from stewart_dynamics.parameters.table import Parameters
 
@@ -38,6 +37,7 @@ class PoseLimits:
 
     def __init__(self, parameters: Parameters) -> None:
         self.limits = Limits(parameters)
+        self._parameters, self._kind = parameters, parameters.leg_kind
         self.angles = angles_to_check(parameters, self.limits.of_joints)
         self.clearance = clearance_to_check(parameters)
         self.stop_condition = stop_condition_of(parameters)
@@ -47,12 +47,20 @@ class PoseLimits:
 
     def values(self, motions: Array, results: Array) -> dict[str, Array]:
         """Return the (N, 6) values of all limits at rows of motion and their results."""
-        return {**self.lengths_and_angles(motions, results), **self.clearances(motions)}
+        return {**self.drives_and_joints(motions, results), **self.clearances(motions)}
 
-    def lengths_and_angles(self, motions: Array, results: Array) -> dict[str, Array]:
+    @property
+    def of_drives(self) -> tuple[str, ...]:
+        """Return the names of the limits of drives and levers that are given."""
+        kind = self._kind
+        return tuple(name for name in (kind.lever_limit, *kind.position_limits)
+                     if name in self.limits.bounds)
+
+    def drives_and_joints(self, motions: Array, results: Array) -> dict[str, Array]:
         """Return the values (N, 6) of all limits but that of the clearance, which takes long."""
-        lengths = results[:, LENGTHS]
-        found = {name: lengths for name in (LENGTH_MIN, LENGTH_MAX) if name in self.limits.bounds}
+        kind, positions = self._kind, results[:, self._kind.position.columns]
+        found = {name: kind.lever_ratios(self._parameters, results) if name == kind.lever_limit
+                 else positions for name in self.of_drives}
         if self.angles is not None:
             angles = self.angles(motions)
             found.update((name, angles[:, ANGLES[name]]) for name in self.limits.of_joints)
@@ -94,7 +102,7 @@ class PoseLimits:
     def first_exceeded(self, motion: Array, result: Array) -> Exceedance | None:
         """Return the first limit that a pose at rest exceeds, of its row of motion and result."""
         motions, results = motion[None], result[None]
-        values = self.lengths_and_angles(motions, results)
+        values = self.drives_and_joints(motions, results)
         found = self.limits.exceeded({name: each[0].tolist() for name, each in values.items()})
         for name, (loads, bounds) in self.loads(motions, results).items():
             leg = int(np.argmax(np.abs(loads[0]) - bounds[0]))

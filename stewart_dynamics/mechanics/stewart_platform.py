@@ -146,7 +146,7 @@ class StewartPlatform:
         _, _, results, unsolvable, shape = self._solved(motion, wrench, base, singular)
         for forces in FORCES, JOINT_FORCES, self._kind.effort.columns:
             results[unsolvable, forces] = np.nan
-        return InverseDynamics(results.reshape(*shape, -1))
+        return InverseDynamics(results.reshape(*shape, results.shape[-1]))
 
     def _solved(
             self, motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
@@ -157,7 +157,7 @@ class StewartPlatform:
         unreachable = batch.find_unreachable(
             self.structure, self.parameters.joints, rows, results, shape, singular)
         results[unreachable] = 0.0
-        check_finite('motion', results.reshape(*shape, -1), len(shape))
+        check_finite('motion', results.reshape(*shape, results.shape[-1]), len(shape))
         unsolvable = batch.find_unsolvable(rows, results, shape, singular)
         results[unreachable] = np.nan
         return rows, (wrenches, bases), results, unsolvable, shape
@@ -545,7 +545,8 @@ class StewartPlatform:
         pose : Pose or Motion
             Poses of any leading shape (...).
         leg_stiffness : float or (..., 6)
-            Stiffness of each leg along its axis [N/m]; one number is for all legs.
+            Stiffness of each leg along its axis [N/m], or of its drive where that turns
+            [N m/rad]; one number is for all legs.
 
         Returns
         -------
@@ -553,7 +554,7 @@ class StewartPlatform:
             ``J_q^T k J_q`` in [N/m], [N] and [N m/rad]; see ``mechanics.stiffness``.
 
         """
-        legs = stiffness.leg_stiffnesses(leg_stiffness)
+        legs = stiffness.leg_stiffnesses(leg_stiffness, self._kind.stiffness_unit)
         j_q = self.drive_jacobian(pose)
         shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
         with np.errstate(all='ignore'):
@@ -569,7 +570,7 @@ class StewartPlatform:
         ``parameters.replaced({'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
         'drive.screw_inertia': None})``.
         """
-        legs = stiffness.leg_stiffnesses(leg_stiffness)
+        legs = stiffness.leg_stiffnesses(leg_stiffness, self._kind.stiffness_unit)
         mass, j_q = self.mass_matrix(pose), self.drive_jacobian(pose)
         shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
         with np.errstate(all='ignore'):

@@ -9,13 +9,14 @@ Legs of stiffness k_i hold a small displacement ``dX = [dx; dtheta]`` (base axes
 turn with their legs, the springs are those of the drives at held motors: J_q in place of J_inv
 (``turning_screws``). Forces f of the legs turn with them, by
 ``ds = (1 - s s^T) / L (dx + dtheta x a)``, and so do the arms a, by ``dtheta x a``:
-``geometric_stiffness`` is minus the derivative of their wrench. Undamped small vibrations obey
+``geometric_stiffness`` is minus the derivative of their wrench. Stiffnesses of drives that
+turn, [N m/rad], are those at J_q likewise. Undamped small vibrations obey
 ``M dX'' + K dX = 0``: modes are the solutions of ``K phi = omega^2 M phi``.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,10 +26,12 @@ from stewart_dynamics.errors import MotionError
 from stewart_dynamics.legs.lines import Lines
 from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.dynamics.lagrange import drive_jacobian_rate
-from stewart_dynamics.parameters.table import DRIVE_INERTIAS
+from stewart_dynamics.parameters.table import DRIVE_INERTIAS, Parameters
 
-HELD_MOTORS = {'actuator.reflected_mass': 0.0, **dict.fromkeys(DRIVE_INERTIAS)}
-"""Changes of parameters with which vibrations do not turn rotors and screws."""
+
+def held_motors(parameters: Parameters) -> dict[str, Any]:
+    """Return changes of parameters with which vibrations do not turn rotors and screws."""
+    return {parameters.leg_kind.fields['reflected_mass']: 0.0, **dict.fromkeys(DRIVE_INERTIAS)}
 
 
 class NaturalModes(NamedTuple):
@@ -56,13 +59,13 @@ class NaturalModes(NamedTuple):
         return f'<NaturalModes: {listed} Hz>'
 
 
-def leg_stiffnesses(value: ArrayLike) -> Array:
-    """Return stiffnesses (..., 6) [N/m]; MotionError where one is not positive."""
+def leg_stiffnesses(value: ArrayLike, unit: str = 'N/m') -> Array:
+    """Return stiffnesses (..., 6); MotionError where one is not positive."""
     is_number = np.isscalar(value) or getattr(value, 'shape', None) == ()
     legs = as_array('leg_stiffness', value, () if is_number else (6,))
     legs = np.full(6, legs) if is_number else legs
     if not (legs > 0.0).all():
-        raise MotionError(f'leg_stiffness: {legs.min():g} N/m: must be more than 0')
+        raise MotionError(f'leg_stiffness: {legs.min():g} {unit}: must be more than 0')
     return legs
 
 

@@ -121,7 +121,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._joint_states = PublisherAtRate(
             publishers.get(JOINT_STATES), rate, self._model_messages.joint_states)
         self._transforms_read = False  # they have a subscriber
-        self._travel = TravelPublisher(parameters, publishers.get(TRAVEL))
+        self._travel = TravelPublisher(parameters, publishers[TRAVEL])
         self._model_measured = parameters.joint_states.source == AS_MEASURED
         self._handled, self._rested = -math.inf, False
 

@@ -79,7 +79,6 @@ class TravelPublisher(PublisherAtRate):
     Publishes ``~/travel``: how far the platform can go from the pose of the last setpoint.
 
     parameters: geometry and limits; ``use`` replaces them.
-    publisher: None if the topic is not there.
     """
 
     def __init__(self, parameters: Parameters, publisher: Any) -> None:
@@ -94,14 +93,12 @@ class TravelPublisher(PublisherAtRate):
         """Use other parameters from now on."""
         self._parameters = parameters
         self._values: Future[Array] | None = None
-        if self._publisher is not None:
-            self._capability = self._thread.submit(
-                lambda: Capability(StewartPlatform(parameters)))
+        self._capability = self._thread.submit(
+            lambda: Capability(StewartPlatform(parameters)))
 
     def look(self) -> str:
         """Check whether there is a subscriber; return a notice where no limit is set, once."""
-        self._read = (
-            self._publisher is not None and self._publisher.get_subscription_count() > 0)
+        self._read = self._publisher.get_subscription_count() > 0
         if not self._read:
             return ''
         limits = limits_of(self._parameters).poses

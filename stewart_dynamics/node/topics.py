@@ -21,7 +21,6 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from stewart_dynamics.capability.capability import CAPABLE
 from stewart_dynamics.description.model import JOINT_STATES, MODEL_TYPES, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH
@@ -140,8 +139,7 @@ PUBLISHED = (
           'legs, or `singularity.stop_condition`, about the origin of the platform. It is 0 if '
           'the pose exceeds a limit already; without a limit on the way it is one turn for a '
           'rotation, the largest finite number for a translation. At most '
-          f'{TRAVEL_RATE:g} Hz, computed while somebody subscribes; of '
-          f'{" and ".join(kind.name for kind in CAPABLE)} legs', depth=1),
+          f'{TRAVEL_RATE:g} Hz, computed while somebody subscribes', depth=1),
     Topic(JOINT_STATES, MODEL_TYPES[JOINT_STATES], 'positions of all joints of the URDF, for '
           '[robot_state_publisher](visualization.md#as-a-model); at most `visualization_rate`, '
           'while somebody subscribes'),
@@ -194,7 +192,6 @@ class NodeTopics:
         there = {MARKERS: parameters.visualization_rate > 0.0, TF: parameters.publish_tf}
         there[JOINT_STATES] = there[MARKERS]
         there[MOTOR_STATES] = there[MOTOR_TORQUES] = bool(parameters.drives)
-        there[TRAVEL] = parameters.leg_kind in CAPABLE
         there |= {topic: kind is parameters.leg_kind
                   for kind in KINDS for topic in LegTopics.of(kind)}
         for topic in PUBLISHED:
