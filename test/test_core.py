@@ -33,7 +33,8 @@ KINDS = ('baseline', 'avx2', 'avx512')[:function('processor_kind')() + 1]
 SIZES = 1, 2, 3, 7, 8, 9, 33
 
 
-CRANKS = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
+CRANKS = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml').replaced({
+    'servo.angle_at_min': -1.0, 'servo.angle_at_max': 1.0})
 
 
 def hexapods() -> list[Parameters]:
@@ -283,7 +284,10 @@ OF_CRANKS: dict[str, tuple[str, Any]] = {
         3, [0.0, 0.0, 1.0] - 2e-3 * CRANKS.structure['legs']['crank_axis'][3])),
     'BRANCH': ('branch', (4, 0.0)), 'CRANK_INERTIA': (
         'crank_inertia', (5, [1.0, 0.0, 0.0, 1.0, 0.0, -1e-6])),
-    'ANGLES': ('angle_min', (0, 2.0)), 'LEVER': ('lever_min', (1, 1.0))}
+    'ANGLES': ('angle_min', (0, 2.0)), 'LEVER': ('lever_min', (1, 1.0)),
+    'SERVO_POINTS': ('servo_angle_at_min', (2, NOT)),
+    'SERVO_ANGLES': ('servo_angle_at_min', (3, 1.0)),
+    'SERVO_PULSES': ('servo_pulse_min', (4, 0.003))}
 BREAKING |= OF_CRANKS
 
 
