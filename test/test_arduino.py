@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import io
-import math
 from pathlib import Path
 import shutil
 import subprocess

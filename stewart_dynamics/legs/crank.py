@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
