@@ -16,16 +16,14 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from builtin_interfaces.msg import Time  # noqa: E402
-from geometry_msgs.msg import WrenchStamped  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from running import (  # noqa: E402
-    bits, DynamicsNode, ERROR, NODE, OK, ROOT, Sample, WARN)
+    bits, DynamicsNode, ERROR, header, INPUTS, NODE, OK, ROOT, Sample, WARN)
 from sensor_msgs.msg import JointState  # noqa: E402
-from std_msgs.msg import Float64MultiArray, Header  # noqa: E402
+from std_msgs.msg import Float64MultiArray  # noqa: E402
 from stewart_dynamics import Capability, StewartPlatform  # noqa: E402
-from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.mechanics.batch import missing_distances  # noqa: E402
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.replay.replay_command_line import main as replay  # noqa: E402
 from test_replay import recorded, write_bag  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
@@ -246,7 +244,7 @@ def test_motors_behind_gears_have_states_and_torques(start: Start, tmp_path: Pat
 
 
 def test_measured_angles_and_torques_show_the_external_wrench(node: DynamicsNode) -> None:
-    answers = node.peer.listen(f'{NODE}/external_wrench', WrenchStamped)
+    answers = node.peer.listen(f'{NODE}/external_wrench', INPUTS['wrench'])
     writer = node.peer.writer(f'{NODE}/measured_legs', JointState)
     node.until(lambda: writer.get_subscription_count() == 1, 'the node hears measurements')
     node.answer(HOME)
@@ -256,11 +254,10 @@ def test_measured_angles_and_torques_show_the_external_wrench(node: DynamicsNode
     for n in range(400):
         stamp = begin + 2_000_000 * n
         writer.publish(JointState(
-            header=Header(stamp=Time(sec=stamp // 10 ** 9, nanosec=stamp % 10 ** 9)),
-            name=[*JOINTS], position=held.angles.tolist(), velocity=[0.0] * 6,
-            effort=held.torques.tolist()))
+            header=header(stamp), name=[*JOINTS], position=held.angles.tolist(),
+            velocity=[0.0] * 6, effort=held.torques.tolist()))
         node.until(lambda n=n: len(answers) >= n, 'each is answered')  # type: ignore[misc]
-    found = deserialize_message(answers[-1], WrenchStamped).wrench
+    found = deserialize_message(answers[-1], INPUTS['wrench']).wrench
     wrench = [found.force.x, found.force.y, found.force.z,
               found.torque.x, found.torque.y, found.torque.z]
     assert np.abs(np.array(wrench) - load).max() < 1e-6 * np.abs(load).max()
@@ -271,8 +268,8 @@ def test_measured_angles_and_torques_show_the_external_wrench(node: DynamicsNode
     for angles in ([3.0, -3.0] * 3, held.angles.tolist()):
         stamp += 2_000_000
         writer.publish(JointState(
-            header=Header(stamp=Time(sec=stamp // 10 ** 9, nanosec=stamp % 10 ** 9)),
-            name=[*JOINTS], position=angles, velocity=[0.0] * 6, effort=held.torques.tolist()))
+            header=header(stamp), name=[*JOINTS], position=angles, velocity=[0.0] * 6,
+            effort=held.torques.tolist()))
     node.until_said('measured_legs rejected: ')
     assert 'angles [3, -3, 3, -3, 3, -3] rad' in node.program.stderr
     node.until(lambda: len(answers) >= 400, 'the next one is used')

@@ -157,8 +157,8 @@ def test_figure_18(unit: Unit) -> None:
     rows = _recorded_inputs(bag)
     for n, row in enumerate(rows):
         unit.put(0, row)
-        assert unit.step(0.01) == expected.forces[n].tolist(), n
-        assert unit.get(LENGTHS) == expected.lengths[n].tolist()
+        assert unit.step(0.01) == expected.efforts[n].tolist(), n
+        assert unit.get(LENGTHS) == expected.drive_positions[n].tolist()
         assert unit.get(JOINT_FORCES) == expected.joint_forces[n].tolist()
         assert unit.warning == expected.warnings[n]
     assert len(rows) == len(expected.stamps) == 1001

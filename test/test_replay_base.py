@@ -145,7 +145,7 @@ def test_a_replay_gives_the_bits_of_the_step_and_states_where_the_base_is_not_kn
             assert stamp not in loads
             continue
         assert demanded == list(map(float, cells))
-        assert answer.forces[0].tolist() == forces[stamp]
+        assert answer.efforts[0].tolist() == forces[stamp]
         assert base_wrench == six_of(loads[stamp]) == list(map(float, of_base))
         # and the library's
         assert setpoint.bases is not None
@@ -350,7 +350,7 @@ def test_measured_forces_on_a_base_that_moves_differ_by_a_missing_mass_and_nothi
         for setpoint, answer in answers(parameters, of):
             stamp = int(setpoint.stamps[0])
             forces = true.solve(setpoint.motions, None, setpoint.bases)[0, 12:18]
-            added.append(forces - answer.forces[0])
+            added.append(forces - answer.efforts[0])
             legs.append(('/hexapod/state', RECORDED + stamp + 3, messages.joint_state(
                 stamp, parameters['joints'], [], [], forces)))
         replayed(sorted([*of, *legs], key=lambda each: each[1]), parameters, tmp_path / name,

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from referees import (
     QUARTER_TURN, random_base_motion, random_motion, random_parameters, random_wrench, relative,
-    rng, symmetric_parameters)
+    rng, ROOT, rotation_about, symmetric_parameters)
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.core.binding import CONSTANTS
@@ -25,7 +25,7 @@ from stewart_dynamics.mechanics.limits import (
     LENGTH_MIN, LIMITS, Limits, OF_LEGS, OF_LOADS, OF_RESULTS, PLATFORM_ANGLE_MAX, result_values,
     TOLERANCE, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
-    FORCES, JOINT_FORCES, LENGTHS, NO_BASE, RATES, RESULT)
+    FORCES, JOINT_FORCES, LENGTHS, MOTION, NO_BASE, RATES, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import LEG_SHAPE
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
@@ -465,3 +465,31 @@ def test_unknown_forces_exceed_no_limit() -> None:
      'f: force -7000 N is 1000 N above limits.force_max')])
 def test_the_text_says_which_leg_and_by_how_much(exceedance: Exceedance, words: str) -> None:
     assert exceedance.words('abcdef') == words
+
+
+def test_the_time_to_a_dead_centre_is_that_of_the_square_of_the_lever() -> None:
+    p = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
+    platform, step, random, h = StewartPlatform(p), Step(p), rng(5), 1e-6
+    home, size = platform.home_pose().position, p['legs.crank.length']
+    rows = np.zeros((40, MOTION))
+    for row in rows:
+        row[3:12] = rotation_about(random.normal(size=3), random.uniform(0.0, 0.1)).ravel()
+        row[:3] = home + random.uniform(-0.03, 0.03, 3)
+        row[12:18] = random.uniform(-1.0, 1.0, 6)
+    later = rows.copy()
+    later[:, :3] += h * rows[:, 12:15]
+    for row, omega in zip(later, rows[:, 15:18], strict=True):
+        turn = rotation_about(omega, h * float(np.linalg.norm(omega)))
+        row[3:12] = (turn @ row[3:12].reshape(3, 3)).ravel()
+    squares, after = (platform.inverse_dynamics(Motion.of_rows(each)).levers ** 2
+                      for each in (rows, later))
+    rate = (after - squares) / h
+    with np.errstate(divide='ignore'):
+        expected = np.where(rate < 0.0, ((0.1 * size) ** 2 - squares) / rate, np.inf)
+    found = step(Batch.of(np.arange(40), rows)).lever_times
+    near = np.isfinite(expected) & (expected < 10.0)
+    assert near.sum() > 60
+    np.testing.assert_allclose(found[near], expected[near], rtol=1e-4)
+    assert (found[~np.isfinite(expected)] == np.inf).mean() > 0.95
+    # Telescopic legs have none.
+    assert (answered(STEP, HOME).lever_times == np.inf).all()

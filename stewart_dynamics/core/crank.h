@@ -223,16 +223,21 @@ static double crank_rate_max(const stewart_leg * leg) {return leg->crank_speed_m
 static double crank_lever_ratio(const stewart_leg * leg, double lever)
 {return fabs(lever) / leg->crank_length;}
 
-/* The square of the lever is the reserve of reach, h^2 (L1 / L2)^2: unlike the lever it is smooth
-   at a dead centre, so that its rate shows when the least lever is reached. */
+/* The square of the lever is (L1 / L2)^2 (x^2 + y^2 - g^2), the reserve of reach: unlike the lever it
+   is smooth at a dead centre, so that its rate shows when the least lever is reached. */
 static double crank_lever_time(
   const stewart_leg * leg, const stewart_motion * motion, double lever) {
-  crank_motion of = crank_motion_of(leg, motion);
-  vector d = of.at.line.direction, d_rate = scale(of.at.line.per_length, of.gap_rate);
-  double lever_rate = leg->crank_length *
-    (dot(d_rate, of.at.normal) - of.drive.rate * dot(d, of.at.along));
-  double least_lever = leg->lever_min * leg->crank_length;
-  double left = lever * lever - least_lever * least_lever, rate = 2.0 * lever * lever_rate;
+  double size = leg->crank_length, least_lever = leg->lever_min * size;
+  double left = lever * lever - least_lever * least_lever;
+  vector z = read3(leg->crank_direction), n0 = cross(read3(leg->crank_axis), z);
+  vector arm = rotate(motion->rotation, read3(leg->platform_joint));
+  vector l = subtract(add(read3(motion->position), arm), read3(leg->base_joint));
+  vector l_rate = add(read3(motion->linear_velocity),
+                      cross(read3(motion->angular_velocity), arm));
+  double g = (dot(l, l) + size * size - leg->rod_length * leg->rod_length) * (0.5 / size);
+  double reserve_rate = 2.0 * (dot(l, z) * dot(l_rate, z) + dot(l, n0) * dot(l_rate, n0) -
+                               g * dot(l, l_rate) / size);
+  double part = size / leg->rod_length, rate = part * part * reserve_rate;
   if (!(left > 0.0)) {return 0.0;}
   return rate < 0.0 ? -left / rate : HUGE_VAL;
 }
