@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 from referees import (
-    QUARTER_TURN, random_base_motion, random_motion, random_parameters, random_wrench, relative,
-    rng, ROOT, rotation_about, symmetric_parameters)
+    QUARTER_TURN, random_base_motion, random_direction, random_motion, random_parameters,
+    random_wrench, relative, rng, ROOT, rotation_about, symmetric_parameters)
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.core.binding import CONSTANTS
@@ -473,13 +473,13 @@ def test_the_time_to_a_dead_centre_is_that_of_the_square_of_the_lever() -> None:
     home, size = platform.home_pose().position, p['legs.crank.length']
     rows = np.zeros((40, MOTION))
     for row in rows:
-        row[3:12] = rotation_about(random.normal(size=3), random.uniform(0.0, 0.1)).ravel()
+        row[3:12] = rotation_about(random_direction(random), random.uniform(0.0, 0.1)).ravel()
         row[:3] = home + random.uniform(-0.03, 0.03, 3)
         row[12:18] = random.uniform(-1.0, 1.0, 6)
     later = rows.copy()
     later[:, :3] += h * rows[:, 12:15]
     for row, omega in zip(later, rows[:, 15:18], strict=True):
-        turn = rotation_about(omega, h * float(np.linalg.norm(omega)))
+        turn = rotation_about(omega / np.linalg.norm(omega), h * float(np.linalg.norm(omega)))
         row[3:12] = (turn @ row[3:12].reshape(3, 3)).ravel()
     squares, after = (platform.inverse_dynamics(Motion.of_rows(each)).levers ** 2
                       for each in (rows, later))

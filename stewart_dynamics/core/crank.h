@@ -223,8 +223,8 @@ static double crank_rate_max(const stewart_leg * leg) {return leg->crank_speed_m
 static double crank_lever_ratio(const stewart_leg * leg, double lever)
 {return fabs(lever) / leg->crank_length;}
 
-/* The square of the lever is (L1 / L2)^2 (x^2 + y^2 - g^2), the reserve of reach: unlike the lever it
-   is smooth at a dead centre, so that its rate shows when the least lever is reached. */
+/* The square of the lever is (L1 / L2)^2 (x^2 + y^2 - g^2), the reserve of reach: unlike the
+   lever it is smooth at a dead centre, so that its rate shows when the least lever is reached. */
 static double crank_lever_time(
   const stewart_leg * leg, const stewart_motion * motion, double lever) {
   double size = leg->crank_length, least_lever = leg->lever_min * size;
