@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from stewart_dynamics.capability.reachable import Reachable
     from stewart_dynamics.cueing.motion_cueing import CueingStream, Felt, MotionCueing
     from stewart_dynamics.errors import (
-        BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
+        BagError, MotionError, ParameterError, PoseError, ReachError, SingularityError,
+        StewartError)
     from stewart_dynamics.mechanics.drives.motors import Motors
     from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdown
     from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
@@ -38,7 +39,7 @@ __all__ = [
     'BagError', 'BaseMotion', 'Calibration', 'Capability', 'CueingStream', 'Extent', 'Felt',
     'ForceBreakdown', 'GovernedStream', 'InverseDynamics', 'Motion', 'MotionCueing',
     'MotionError', 'Motors', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory',
-    'Pose', 'PoseError', 'Reachable', 'RecordedLegStates', 'RecordedSetpoints',
+    'Pose', 'PoseError', 'ReachError', 'Reachable', 'RecordedLegStates', 'RecordedSetpoints',
     'SingularityError', 'StewartError', 'StewartPlatform', 'TimedMotion', '__version__',
     'approach', 'calibrate', 'check_planned_trajectory', 'read_legs', 'read_setpoints',
     'rest_to_rest']
@@ -48,8 +49,8 @@ _MODULES = {
     'capability.capability': ('Capability', 'Extent'),
     'capability.reachable': ('Reachable',),
     'cueing.motion_cueing': ('CueingStream', 'Felt', 'MotionCueing'),
-    'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
-               'StewartError'),
+    'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'ReachError',
+               'SingularityError', 'StewartError'),
     'mechanics.frames.base_motion': ('BaseMotion',),
     'mechanics.drives.motors': ('Motors',),
     'mechanics.dynamics.force_breakdown': ('ForceBreakdown',),

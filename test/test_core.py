@@ -33,8 +33,8 @@ KINDS = ('baseline', 'avx2', 'avx512')[:function('processor_kind')() + 1]
 SIZES = 1, 2, 3, 7, 8, 9, 33
 
 
-CRANKS = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml').replaced({
-    'servo.angle_at_min': -1.0, 'servo.angle_at_max': 1.0})
+CRANKS = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
+SERVOS = CRANKS.replaced({'servo.angle_at_min': -0.5, 'servo.angle_at_max': 0.5})
 
 
 def hexapods() -> list[Parameters]:
@@ -222,7 +222,7 @@ def broken(name: str) -> Any:
 
     One with drives and plates; the rules that cranks have are broken by one with cranks.
     """
-    hexapod: Any = (CRANKS if name in OF_CRANKS else HEXAPOD).structure.copy()
+    hexapod: Any = (SERVOS if name in OF_CRANKS else HEXAPOD).structure.copy()
     legs = hexapod['legs']
     if name == 'TEMPERATURE_RISE':
         legs['thermal_time_constant'] = NOT
@@ -286,14 +286,14 @@ OF_CRANKS: dict[str, tuple[str, Any]] = {
         'crank_inertia', (5, [1.0, 0.0, 0.0, 1.0, 0.0, -1e-6])),
     'ANGLES': ('angle_min', (0, 2.0)), 'LEVER': ('lever_min', (1, 1.0)),
     'SERVO_POINTS': ('servo_angle_at_min', (2, NOT)),
-    'SERVO_ANGLES': ('servo_angle_at_min', (3, 1.0)),
-    'SERVO_PULSES': ('servo_pulse_min', (4, 0.003))}
+    'SERVO_ANGLES': ('servo_angle_at_min', (3, 0.5)),
+    'SERVO_PULSES': ('servo_pulse_min', (4, 3e-3))}
 BREAKING |= OF_CRANKS
 
 
 @pytest.mark.parametrize('name', BREAKING)
 def test_a_broken_rule_is_named_with_its_leg(name: str) -> None:
-    assert broken_rule(HEXAPOD.structure) is None is broken_rule(CRANKS.structure)
+    assert broken_rule(HEXAPOD.structure) is None is broken_rule(SERVOS.structure)
     found = broken_rule(broken(name))
     assert found is not None
     rule, where = found
