@@ -303,6 +303,24 @@ def test_a_rod_that_does_not_reach_is_named_with_the_missing_distance(missing: f
     assert issubclass(ReachError, SingularityError)
 
 
+def test_the_edge_of_reach_is_reachable_or_not_but_never_an_overflow() -> None:
+    """A bisection ends at neighbouring numbers, one of which the rod does not reach."""
+    platform = StewartPlatform.from_yaml('config/crank_platform.yaml')
+    home = platform.home_pose()
+    random, seen = rng(3), 0
+    for direction in random.normal(0.0, 1.0, (60, 3)):
+        low, high = 0.0, 2.0
+        while (middle := 0.5 * (low + high)) not in (low, high):
+            motion = Motion(home.position + middle * direction, home.rotation)
+            marked = platform.inverse_dynamics(motion, singular='nan')
+            reached = bool(np.isfinite(marked.rows).all())
+            low, high = (middle, high) if reached else (low, middle)
+        with pytest.raises(ReachError, match='cannot reach'):
+            platform.inverse_dynamics(Motion(home.position + high * direction, home.rotation))
+        seen += 1
+    assert seen == 60
+
+
 def test_samples_out_of_reach_can_be_marked() -> None:
     platform = StewartPlatform.from_yaml('config/crank_platform.yaml')
     home = platform.home_pose()

@@ -213,7 +213,10 @@ static double crank_missing(const stewart_leg * leg, const double position[3], c
   double height = dot(l, u), size = leg->crank_length, rod = leg->rod_length;
   double radius = sqrt(largest(dot(l, l) - height * height, 0.0));
   double nearest = hypot(radius - size, height), farthest = hypot(radius + size, height);
-  return largest(largest(nearest - rod, rod - farthest), 0.0);
+  double missing = largest(largest(nearest - rod, rod - farthest), 0.0);
+  /* At the end of reach rounding decides: as for the angle. */
+  return missing == 0.0 && isnan(crank_pose_of(leg, position, r).line.lever)
+    ? rod * ROUNDING : missing;
 }
 
 static double * crank_positions(stewart_result * result) {return result->angles;}

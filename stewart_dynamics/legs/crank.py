@@ -49,6 +49,7 @@ class Crank(LegKind):
     effort = Named('torque', 'torques', 'N m', '+ drives the angle up', 'drives it down')
     effort_signs = 'drives the angle up', 'drives it down'
     extremes = 'smallest angle', 'largest angle'
+    decimals = 4
     position_limits = 'limits.angle_min', 'limits.angle_max'
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
     lever_limit, ends_differ = 'limits.lever_min', True

@@ -135,9 +135,10 @@ def _signs_and_zeros(p: Parameters, home: AtHome, angles: Array, signs: Array) -
         few = np.flatnonzero(pushing if pushing.sum() < 3 else ~pushing)
         if 0 < len(few) < 3:
             here, there = ('push', 'pull') if pushing[few[0]] else ('pull', 'push')
-            yield (f'geometry.crank_axes: {_names(p, few)}: positive angles {here} the platform '
-                   f'joint, those of the other cranks {there}: the sign of an axis? Mirror images '
-                   'turn in opposite senses')
+            rest = np.setdiff1d(np.arange(6), few)
+            yield (f'geometry.crank_axes: positive angles of {_names(p, few)} {here} the platform '
+                   f'joint, those of {_names(p, rest)} {there}: the sign of one of these axes? '
+                   'Mirror images turn in opposite senses')
     elif len(others) < 3:
         expected = (middles + signs * np.median(turned[alike]))[others]
         for leg, angle in zip(others, expected, strict=True):

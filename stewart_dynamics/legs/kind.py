@@ -108,6 +108,8 @@ class LegKind(ABC):
         What a positive effort is called, and a negative one.
     extremes : tuple of str
         What the smallest and the largest position are called.
+    decimals : int
+        Decimals of efforts and powers in tables: torques of small servos are a few mN m.
     position_limits : tuple of str
         Limits of the drive's position, the smallest and the largest.
     rate_limit, effort_limit : str
@@ -167,6 +169,7 @@ class LegKind(ABC):
     effort: Named
     effort_signs: tuple[str, str]
     extremes: tuple[str, str]
+    decimals: int = 1
     position_limits: tuple[str, str]
     rate_limit: str
     effort_limit: str

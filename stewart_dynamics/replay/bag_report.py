@@ -162,7 +162,8 @@ class Report:
             quantities={name: limit.quantity for name, limit in LIMITS.items()},
             units={name: each.unit or '' for name, each in PARAMETERS.items()},
             most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS_OF_WRENCH,
-            kind=self._kind, keys=LegKeys.of(self._kind), key_of=key_of, unit_key=unit_key,
+            kind=self._kind, effort_decimals=self._kind.decimals,
+            keys=LegKeys.of(self._kind), key_of=key_of, unit_key=unit_key,
             percent=PERCENT, bandwidth=bandwidth, **_response_charts(followed),
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
             if self._operating and known else {})

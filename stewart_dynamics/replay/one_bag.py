@@ -47,7 +47,7 @@ from stewart_dynamics.response.recorded_response import (
 from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
-from stewart_dynamics.setpoints.rejections import Rejection, stamp_of
+from stewart_dynamics.setpoints.rejections import OUT_OF_REACH, Rejection, stamp_of
 from stewart_dynamics.setpoints.step import Batch, FIRST, Step
 from stewart_dynamics.setpoints.unanswered import unanswered
 from stewart_dynamics.whole_file import write_json
@@ -248,7 +248,8 @@ class _Run:
             mistakes += self._differentiator.stamps.mistakes(True, [inputs.POSE])
         if self._comparison is not None:
             mistakes += self._comparison.stamps.mistakes(True, [MEASURED])
-        values['limit_met'] = values['limit_met'] or bool(mistakes)
+        unreachable = any(each.reason == OUT_OF_REACH for each in self._setpoints.counts)
+        values['limit_met'] = values['limit_met'] or bool(mistakes) or unreachable
         measured = None if self._comparison is None else self._comparison.values()
         if measured and not measured['setpoints_compared']:
             missing.append(f'nothing could be compared with {self._options.measured}: no '

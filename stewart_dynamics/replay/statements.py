@@ -23,7 +23,7 @@ from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.summary import kind_in, margin_key, unit_key
 from stewart_dynamics.reporting.pages import fixed
-from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, Rejection
+from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, OUT_OF_REACH, Rejection
 
 Summary = Mapping[str, Any]  # the content of summary.json
 
@@ -187,7 +187,9 @@ def _limits(summary: Summary) -> Iterator[Statement]:
             why = ' ' + '; '.join(f'in {plural(number, "setpoint")}: {cause}'
                                   for number, cause in causes if number)
         yield Statement(_topic(name), 'warn', f'{name} could not be checked{why}')
-    problems = points['jumps'] or summary['limits'] or summary['limits_not_checked']
+    unreachable = [each for each in summary['rejected'] if each['reason'] == OUT_OF_REACH]
+    problems = (points['jumps'] or summary['limits'] or summary['limits_not_checked']
+                or unreachable)
     if not problems and _has_margins(summary['legs']):
         yield (Statement(LIMITS, 'warn', 'no limit was met by inputs that contradict each other')
                if _contradicting(summary) else _held(summary, LIMITS, 'all limits'))

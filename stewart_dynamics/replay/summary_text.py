@@ -141,9 +141,11 @@ def _columns(kind: LegKind) -> list[tuple[str, str, str, int, int]]:
     effort, position, rate = (f'{each.name} [{each.unit}]' for each in (
         kind.effort, kind.position, kind.rate))
     return [
-        (effort, 'peak', keys.effort_peak, 10, 1), (effort, 'at [s]', keys.effort_at, 9, 2),
-        (effort, 'RMS', keys.effort_rms, 9, 1), (effort, 'margin', keys.effort_margin, 9, 1),
-        ('power [W]', 'peak', 'power_peak_w', 10, 1),
+        (effort, 'peak', keys.effort_peak, 10, kind.decimals),
+        (effort, 'at [s]', keys.effort_at, 9, 2),
+        (effort, 'RMS', keys.effort_rms, 9, kind.decimals),
+        (effort, 'margin', keys.effort_margin, 9, kind.decimals),
+        ('power [W]', 'peak', 'power_peak_w', 10, kind.decimals),
         (position, 'from', keys.position_min, 8, 4), (position, 'to', keys.position_max, 8, 4),
         (position, 'margin', keys.position_margin, 8, 4),
         (rate, 'peak', keys.rate_peak, 9, 4), (rate, 'margin', keys.rate_margin, 8, 4)]
