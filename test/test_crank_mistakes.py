@@ -144,7 +144,8 @@ SLIPS: dict[str, tuple[str, dict[str, Any], str]] = {
     'platform below': ('rig', {'gravity': [0.0, 0.0, 9.80665]},
                        'gravity: [0, 0, 9.81] m/s^2 pulls the platform away from the base'),
     'reversed motor': ('rig', flipped(2), 'geometry.crank_axes: positive angles of leg_3 pull'),
-    'a pair of reversed motors': ('rig', flipped(2, 3), 'geometry.crank_axes: positive angles of leg_3, leg_4 '),
+    'a pair of reversed motors': (
+        'rig', flipped(2, 3), 'geometry.crank_axes: positive angles of leg_3, leg_4 '),
     'a motor that is not mirrored as the others': (
         'mirrored motors', flipped(1, 3), 'geometry.crank_axes: positive angles of leg_2, leg_4 '),
     'horn on the next tooth': ('rig', turned(4, 0.2513),
