@@ -113,6 +113,7 @@ def done_beside(peer: Peer) -> dict[str, set[str]]:
 
 
 DRIVES = 'actuator.screw_lead:=0.005', 'drive.torque_max:=100.0'
+OF_CRANKS = {f'{NODE}/leg_angles', f'{NODE}/leg_torques'}
 SWAY = 'base_motion.amplitude:=[0.0, 0.01, 0.0, 0.0, 0.0, 0.0]', 'base_motion.frequency:=[0.2]'
 COMMANDS = {'leg_controller': [sys.executable, ROOT / 'examples' / 'leg_controller.py']}
 LAST = {'stewart_simulator': '/stewart_simulator/wrench',
@@ -153,9 +154,28 @@ def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
             union.setdefault(right, set()).update(names)
     union['publish'].add('/tf')  # publish_tf, which ROS's wheels on PyPI cannot publish
     union['subscribe'].add('/stewart_simulator/leg_states')  # as demo.launch.py remaps
-    assert union == granted('/stewart_dynamics')
+    allowed = granted('/stewart_dynamics')
+    allowed['publish'] -= OF_CRANKS
+    assert union == allowed
     assert {f'{NODE}/{topic}' for topic in OUTPUTS} < union['publish']
     assert {f'{NODE}/{topic}' for topic in INPUTS} < union['subscribe']
+
+
+def test_the_policy_has_the_topics_of_cranks(domain: int, tmp_path: Path) -> None:
+    peer = Peer(domain)
+    program = Program(
+        [executable('stewart_dynamics'), '--ros-args', '--params-file',
+         ROOT / 'config' / 'crank_platform.yaml'], domain, tmp_path)
+    peer.watched = program
+    try:
+        peer.until(lambda: done_beside(peer).get('publish', set()) >= OF_CRANKS, 'its topics')
+        done = done_beside(peer)['publish']
+        assert done <= granted('/stewart_dynamics')['publish']
+        assert f'{NODE}/leg_lengths' not in done
+    finally:
+        peer.watched = None
+        program.stop()
+        peer.close()
 
 
 @pytest.mark.parametrize(('name', 'files', 'runs'), [
