@@ -282,7 +282,7 @@ def exceeded(parameters: Parameters, motion: Motion) -> list[str]:
     if VELOCITY_MAX in limits.limits.bounds:
         values[VELOCITY_MAX] = results[:, RATES]
     found = [name for name, each in values.items() if limits.limits.exceeds(name, each).any()]
-    found += [name for name, each in result_values(results).items()
+    found += [name for name, each in result_values(parameters, results).items()
               if name in OF_LOADS and limits.limits.exceeds(name, each).any()]
     if parameters.drives:
         motors = StewartPlatform(parameters).motors(motion)
