@@ -228,7 +228,7 @@ def test_the_step_reports_a_clearance_below_its_limit_for_one_and_for_many() -> 
             (CLEARANCE_MIN, leg, clearances[n, leg], bound) for leg in range(6)
             if clearances[n, leg] < bound]
     without = Step(LOWERING)(setpoints)
-    assert np.array_equal(without.forces, many.forces)
+    assert np.array_equal(without.efforts, many.efforts)
     assert without.clearances.shape == (51, 0)
     assert not without.exceeding.any()
 

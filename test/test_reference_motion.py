@@ -22,6 +22,7 @@ PROGRAM = 'stewart_trajectory'
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
 FILES = sorted(CONFIG.glob('trajectory_*.yaml'))
+OF_CRANKS = 'trajectory_cranks'  # test_loop.py holds it against the limits of its hexapod
 
 INITIAL = [0.1, -0.2, 1.1, 0.3, -0.2, 0.4]
 FINAL = [-0.2, 0.1, 0.9, -0.5, 0.6, 1.7]
@@ -238,7 +239,8 @@ def test_a_broken_rule_is_named(name: str, changes: dict[str, object], snapshot:
         parameters(name, **changes)
 
 
-@pytest.mark.parametrize('path', FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize('path', [each for each in FILES if each.stem != OF_CRANKS],
+                         ids=lambda path: path.stem)
 def test_files_suit_the_hexapod(path: Path, platform: StewartPlatform) -> None:
     motion, p = ReferenceMotionParameters.from_yaml(path), platform.parameters
     times = np.arange(0.0, 60.0, 0.01) if motion['loop'] else sample_times(motion) / 1e9

@@ -216,7 +216,7 @@ static double crank_missing(const stewart_leg * leg, const double position[3], c
   double missing = largest(largest(nearest - rod, rod - farthest), 0.0);
   /* At the end of reach rounding decides: as for the angle. */
   return missing == 0.0 && isnan(crank_pose_of(leg, position, r).line.lever)
-    ? rod * ROUNDING : missing;
+    ? rod * LAST_DIGIT : missing;
 }
 
 static double * crank_positions(stewart_result * result) {return result->angles;}

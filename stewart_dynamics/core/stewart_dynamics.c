@@ -34,7 +34,7 @@
 #define RESIDUAL 1e-12             /* of lengths found by the forward kinematics [m] */
 #define NEWTON_STEPS 50            /* 6 at most from nearly everywhere */
 #define HOMOTOPY_STEPS 200         /* of Newton's method in all */
-#define ROUNDING 1e-16             /* of a length, by it */
+#define LAST_DIGIT 1e-16           /* of a length, by it */
 #define RIGHT_ANGLE 1e-3           /* cosine below which two directions are perpendicular */
 
 /* ---- numbers -------------------------------------------------------------------------------- */

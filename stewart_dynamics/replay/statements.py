@@ -187,7 +187,8 @@ def _limits(summary: Summary) -> Iterator[Statement]:
             why = ' ' + '; '.join(f'in {plural(number, "setpoint")}: {cause}'
                                   for number, cause in causes if number)
         yield Statement(_topic(name), 'warn', f'{name} could not be checked{why}')
-    unreachable = [each for each in summary['rejected'] if each['reason'] == OUT_OF_REACH]
+    unreachable = [each for each in summary.get('rejected', ())
+                   if each['reason'] == OUT_OF_REACH]
     problems = (points['jumps'] or summary['limits'] or summary['limits_not_checked']
                 or unreachable)
     if not problems and _has_margins(summary['legs']):
