@@ -150,7 +150,7 @@ class Crank(LegKind):
         tangents, curvatures = at.size * at.normal, -at.size * at.along
         rods = parameters['legs.rod.length']
         directions = (at.line + curvatures) / rods[:, None]
-        return Lines(np.broadcast_to(rods, at.missing.shape), directions, at.arms,
+        return Lines(np.broadcast_to(rods, at.arms.shape[:-1]), directions, at.arms,
                      AnchorPath(tangents, curvatures))
 
     def anchors(self, parameters: Parameters, positions: Array) -> Array:
@@ -166,10 +166,6 @@ class Crank(LegKind):
         lengths = np.linalg.norm(rods, axis=1)
         return (Placed(centers + 0.5 * cranks, cranks / sizes[:, None], sizes),
                 Placed(ends + 0.5 * rods, rods / lengths[:, None], lengths))
-
-    def missing_distances(self, parameters: Parameters, position: Array, rotation: Array) -> Array:
-        """Return how far each platform joint is from the nearest point that its rod reaches."""
-        return _angle_of(parameters, position, rotation).missing
 
     def anchor_circles(self, parameters: Parameters) -> AnchorCircles:
         """
@@ -403,7 +399,6 @@ class _Angle(NamedTuple):
     along: Array  # e (..., 6, 3)
     normal: Array  # n
     size: Array  # length (6, 1) [m]
-    missing: Array  # distance by which the rod misses the platform joint (..., 6) [m]
 
 
 def _angle_of(parameters: Parameters, position: Array, rotation: Array) -> _Angle:
@@ -418,11 +413,7 @@ def _angle_of(parameters: Parameters, position: Array, rotation: Array) -> _Angl
     g = (square + height * height + size * size - rod * rod) / (2.0 * size)
     h = legs['branch'] * np.sqrt(square - g * g)
     cosine, sine = ((x * g + y * h) / square)[..., None], ((y * g - x * h) / square)[..., None]
-    radius = np.sqrt(square)
-    missing = np.maximum(np.hypot(radius - size, height) - rod,
-                         rod - np.hypot(radius + size, height))
-    return _Angle(arms, line, z * cosine + n0 * sine, n0 * cosine - z * sine, size[:, None],
-                  np.maximum(missing, 0.0))
+    return _Angle(arms, line, z * cosine + n0 * sine, n0 * cosine - z * sine, size[:, None])
 
 
 def _of_legs(parameters: Parameters) -> tuple[Array, Array, Array, Array]:
@@ -448,7 +439,7 @@ def _crank_axes(parameters: Parameters, at: Lines) -> Array:
 
 def _forces_at_rest(parameters: Parameters, at: Lines, at_center: Array, at_tip: Array,
                     at_end: Array) -> Array:
-    """Return forces at the platform joints (..., 6, 3) [N] for what the points feel at rest."""
+    """Return forces at the platform joints (..., 6, 3) [N] for accelerations felt at rest."""
     _, _, coupling, end = _of_legs(parameters)
     t, r = _tangent_and_row(at)
     axes = _crank_axes(parameters, at)

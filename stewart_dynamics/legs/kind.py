@@ -5,8 +5,8 @@
 A kind of legs: what the package asks of it.
 
 The mechanics of a kind stand in ``core/<name>.h``. A leg has a drive, whose position, rate and
-effort are numbers of a row of results; the rest of the package reads where they are, what they are
-called, and which parameters belong to them.
+effort are numbers of a row of results; the rest of the package reads their places, their names,
+and the parameters that belong to them.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class LegMass(NamedTuple):
 
 
 class StopLoads(NamedTuple):
-    """What the drives of a hexapod carry, for its end stops and the steps that these need."""
+    """Loads of the drives of a hexapod, for its end stops and the steps that these need."""
 
     inertia: Array  # of the drives alone, at least (6,) [kg] or [kg m^2]
     carried: float  # mass of the parts that move with the platform joints [kg]
@@ -105,9 +105,9 @@ class LegKind(ABC):
     position, rate, effort : Named
         Quantities of the drive.
     effort_signs : tuple of str
-        What a positive effort is called, and a negative one.
+        Names of a positive effort and of a negative one.
     extremes : tuple of str
-        What the smallest and the largest position are called.
+        Names of the smallest and of the largest position.
     decimals : int
         Decimals of efforts and powers in tables: torques of small servos are a few mN m.
     position_limits : tuple of str
@@ -131,11 +131,11 @@ class LegKind(ABC):
     wrong_units : tuple
         Efforts in another unit, by those in the right one, and in words.
     right_sign : str
-        What a positive effort must do.
+        Effect that a positive effort must have.
     gear : str
-        What is between motor and drive.
+        Parts between motor and drive.
     ratio : str
-        The parameter without which there are no motors; empty: none is needed.
+        The parameter without which there are no motors; empty: not needed.
     own : tuple of str
         Parameters, or beginnings of their names, that have no meaning for other kinds.
     fields : mapping
@@ -275,12 +275,6 @@ class LegKind(ABC):
 
         joints (6, 3): platform joints, base frame [m]. positions (6,): of the drives.
         """
-
-    def missing_distances(self, parameters: Parameters, position: Array, rotation: Array,
-                          ) -> Array | None:
-        """Return by how much each leg misses its platform joint (..., 6) [m]; None: never."""
-        del parameters, position, rotation
-        return None
 
     def anchor_circles(self, parameters: Parameters) -> AnchorCircles | None:
         """Return the circles of anchors whose lines have fixed lengths; None: they do not move."""

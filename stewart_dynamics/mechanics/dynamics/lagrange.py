@@ -20,7 +20,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError, ReachError
 from stewart_dynamics.legs.lines import dot, Lines, skew, transposed
-from stewart_dynamics.mechanics.batch import unreached
+from stewart_dynamics.mechanics.batch import missing_distances, unreached
 from stewart_dynamics.mechanics.rows import (
     BASE_AXIS, PITCH, PLATFORM_AXIS, POSITION, ROTATION, TWIST)
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
@@ -34,8 +34,11 @@ def legs(parameters: Parameters, position: Array, rotation: Array) -> Lines:
     """
     with np.errstate(all='ignore'):
         at = unchecked_legs(parameters, position, rotation)
-    missing = parameters.leg_kind.missing_distances(parameters, position, rotation)
-    if missing is not None and (missing > 0.0).any():
+    missing: Array = np.zeros(6)
+    if not np.isfinite(at.directions).all():
+        poses = np.concatenate([position, rotation.reshape(*rotation.shape[:-2], 9)], axis=-1)
+        missing = missing_distances(parameters.structure, poses)
+    if (missing > 0.0).any():
         sample = tuple(map(int, np.argwhere((missing > 0.0).any(axis=-1))[0]))
         raise ReachError(unreached(parameters.joints, missing[sample])
                          + (f' in sample {list(sample)}' if sample else ''))
