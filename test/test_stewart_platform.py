@@ -296,7 +296,9 @@ def test_any_leading_shape_gives_the_same_samples(name: str) -> None:
 
     def check(found: list[Array], truth: list[Array]) -> None:
         for a, b in zip(found, truth, strict=True):
-            np.testing.assert_allclose(a, b, rtol=0.0, atol=off and off * np.abs(b).max())
+            assert a.shape == b.shape
+            np.testing.assert_allclose(
+                a, b, rtol=0.0, atol=off and off * np.abs(b).max(initial=0.0))
 
     whole = call()
     check(call(**{each: value.reshape(3, 4, 6) if isinstance(value, np.ndarray)
@@ -304,6 +306,7 @@ def test_any_leading_shape_gives_the_same_samples(name: str) -> None:
                   for each, value in given.items()}),
           [many.reshape(3, 4, *many.shape[1:]) for many in whole])
     check(call(**{each: value[7] for each, value in given.items()}), [many[7] for many in whole])
+    check(call(**{each: value[:0] for each, value in given.items()}), [many[:0] for many in whole])
     for one in given if len(given) > 1 else ():
         mixed = call(**{one: given[one][7]})
         assert {len(many) for many in mixed} == {12}

@@ -208,8 +208,8 @@ class StewartPlatform:
         parameters; their linear parameters are zero.
         """
         rows, (_, bases), _, _, shape = self._solved(motion, None, base, 'raise')
-        matrix = self.regressors(rows, bases).reshape(*shape, 6, -1)
         names = names_of(self.parameters)
+        matrix = self.regressors(rows, bases).reshape(*shape, 6, len(names))
         if tilt:
             columns = self._tilt_columns(rows, base, shape).reshape(*shape, 6, 2)
             matrix = np.concatenate([matrix, columns], axis=-1)
