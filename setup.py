@@ -77,6 +77,7 @@ extras_require = {
         'flake8-import-order',
         'hypothesis',
         'import-linter',
+        'jsonschema>=4',
         'matplotlib',
         'mcap',
         'mcap-ros2-support',

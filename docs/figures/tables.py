@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Write the generated tables, the topics of security/policy.xml, the controller's parameters.
+Write the generated tables, security/policy.xml, the controller's parameters, the schema.
 
     python docs/figures/tables.py
 
@@ -25,6 +25,7 @@ from stewart_dynamics.legs import CRANK, KINDS
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.circles import circle_names
+from stewart_dynamics.parameters.json_schema import json_schema
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS
 from stewart_dynamics.parameters.table import BY_IMU, FIXED, Parameters
@@ -37,6 +38,7 @@ import yaml
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+SCHEMA = ROOT / 'config' / 'parameters.schema.json'
 CONTROLLER_PARAMETERS = (ROOT / 'ros2_control' / 'stewart_dynamics_controller' / 'src'
                          / 'stewart_dynamics_controller_parameters.yaml')
 HEAD = '| name | type | unit | default | meaning |\n| --- | --- | --- | --- | --- |\n'
@@ -310,6 +312,13 @@ def accuracy_and_speed() -> str:
         '| `make bench-replay` |'))
 
 
+def schema() -> str:
+    """Return the JSON schema of parameter files, of all nodes."""
+    return json.dumps(json_schema((
+        Parameters, ReferenceMotionParameters, SimulatorParameters, CueingParameters)),
+        indent=1) + '\n'
+
+
 def pages() -> dict[Path, dict[str, str]]:
     """Return of each page with generated tables their names and texts."""
     figures, on_a_ship, known = (json.loads((HERE / f'{name}.json').read_text(encoding='utf-8'))
@@ -362,7 +371,9 @@ def main() -> None:
         page.write_text(generated(page.read_text(encoding='utf-8'), tables), encoding='utf-8')
         print(f'{page.relative_to(ROOT)}: {", ".join(tables)}')
     CONTROLLER_PARAMETERS.write_text(controller_parameters(), encoding='utf-8')
-    print(CONTROLLER_PARAMETERS.relative_to(ROOT))
+    SCHEMA.write_text(schema(), encoding='utf-8')
+    for path in (CONTROLLER_PARAMETERS, SCHEMA):
+        print(path.relative_to(ROOT))
 
 
 if __name__ == '__main__':

@@ -46,8 +46,8 @@ _TAGS = {kind: (None, '!', *(f'tag:yaml.org,2002:{tag}' for tag in tags)) for ki
     (yaml.MappingStartEvent, ['map']))}
 _NO_SPACE = re.compile(r'\s*(- )?(?P<name>[A-Za-z_/*][\w./*]*):[^\s:][^:]*')
 
-_OF_ROS = ('use_sim_time', 'start_type_description_service')
-_OF_ROS_PREFIX = 'qos_overrides.'
+OF_ROS = ('use_sim_time', 'start_type_description_service')
+OF_ROS_PREFIX = 'qos_overrides.'
 
 _NAME = re.compile('[A-Za-z_][A-Za-z0-9_]*')
 _LONGEST_ROW = 6
@@ -169,7 +169,7 @@ def no_space(text: str) -> str:
 
 def is_of_ros(name: str) -> bool:
     """Return whether a parameter of this name is one that ROS itself declares in nodes."""
-    return name in _OF_ROS or name.startswith(_OF_ROS_PREFIX)
+    return name in OF_ROS or name.startswith(OF_ROS_PREFIX)
 
 
 def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
@@ -286,7 +286,7 @@ def check_given(name: str, value: Any, source: str) -> None:
         missing = no_space(name)  # {mass:0.5}
         raise ParameterError(f'{given}: has no value' + (f'; {missing}' if missing else ''))
     # ROS ignores a value of another type: the node would not use simulated time.
-    if name in _OF_ROS and not isinstance(value, bool):
+    if name in OF_ROS and not isinstance(value, bool):
         raise ParameterError(f'{given}: {shown(value)}: must be a bool')
 
 
