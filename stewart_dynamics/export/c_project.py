@@ -34,6 +34,11 @@ noexcept not not_eq nullptr operator or or_eq private protected public register 
 restrict return short signed sizeof static static_assert static_cast struct switch template this
 thread_local throw true try typedef typeid typename union unsigned using virtual void volatile
 wchar_t while xor xor_eq""".split())
+# How far the golden vectors hold on another computer.
+_BITS = 'bit for bit'
+_DIGITS = ('but\n * for last digits, which depend on sin, cos and atan2 of its mathematical '
+           'library')
+_LAST_DIGITS = 1e-12  # musl differs from glibc by 2e-15
 # Targets of CMake, names in test_golden.c, functions of math.h, and macros of C and of compilers.
 _TAKEN = frozenset(['all', 'clean', 'compare', 'eof', 'golden', 'help', 'huge_val', 'infinity',
                     'install', 'linux', 'main', 'null', 'package', 'printf', 'stderr', 'stdin',
@@ -90,6 +95,8 @@ def c_project(parameters: Parameters, name: str) -> dict[str, str]:
         '@COLUMNS@': str(len(columns)), '@MORE@': _comparisons(kind),
         '@POSITIONS@': _result(kind.position.columns.start),
         '@DEMANDED@': kind.effort.field, '@EFFORT@': kind.effort.name,
+        '@EXACTNESS@': _BITS if kind.exact else _DIGITS,
+        '@TOLERANCE@': '0.0' if kind.exact else f'{_LAST_DIGITS:g}',
         '@PUBLISHED@': kind.commands, '@PUBLISHEDPART@': kind.commands.upper(),
         '@VECTORS@': ',\n'.join(f'  {{{", ".join(map(hexadecimal, row))}}}' for row in rows)}
 

@@ -126,6 +126,9 @@ class LegKind(ABC):
         Value of the simulator's parameter ``commands`` for these efforts.
     resolved : str
         What a step of the simulator may not do, besides turning the platform by a number.
+    exact : bool
+        Whether results are sums, products, quotients and square roots, which have the same bits on
+        all processors; sin, cos and atan2 depend on the mathematical library.
     width : int
         Numbers in a row of results: those of ``stewart_result`` up to the last of this kind.
     wrong_units : tuple
@@ -180,6 +183,7 @@ class LegKind(ABC):
     commands: str
     simulated: str
     resolved: str
+    exact: bool = True
     width: int = _RESULT['joint_forces'].stop
     right_sign: str
     gear: str
