@@ -21,6 +21,7 @@ import zipfile
 
 from packaging.requirements import Requirement
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'stewart_dynamics'
@@ -284,6 +285,10 @@ def test_setup_agrees_with_package_xml(distribution: importlib.metadata.Distribu
     xml = package_xml()
     assert distribution.metadata['Name'].replace('-', '_') == xml.findtext('name') == NAME
     assert distribution.metadata['Version'] == xml.findtext('version')
+    citation = yaml.safe_load((ROOT / 'CITATION.cff').read_text(encoding='utf-8'))
+    assert citation['version'] == xml.findtext('version')
+    assert f'{citation["version"]} ({citation["date-released"]})' in (
+        ROOT / 'CHANGELOG.rst').read_text(encoding='utf-8').splitlines()
     assert distribution.metadata['License'] == xml.findtext('license') == 'Apache-2.0'
     assert xml.findtext('export/build_type') == 'ament_python'
 
