@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
   bench-replay bench-response clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship docs docs-site export-demo installed \
-  lint lint-flake8 lint-layers lint-mypy lint-pep257 lint-ruff test tools
+  lint lint-flake8 lint-layers lint-mypy lint-pep257 lint-ruff test tools wheels
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -234,6 +234,16 @@ endif
 	@$(PIP) install --no-deps --requirement requirements-fmi.txt
 	@touch $@
 
+# A wheel for each system of setup.py, without compilers of these systems.
+wheels:
+	@$(if $(PYTHON),$(PYTHON),python3) -m venv --clear .venv-wheels
+	@.venv-wheels/bin/python -m pip --quiet install $(ZIG) 'setuptools>=70.1'
+	@for system in $$(.venv-wheels/bin/python -c \
+	  'import re; print(*re.findall("^    .(\w+).: .\w+-", open("setup.py").read(), re.M))'); do \
+	  echo "wheelhouse: $$system"; WHEEL_PLATFORM=$$system .venv-wheels/bin/python -m pip --quiet wheel \
+	    --no-build-isolation --no-deps --wheel-dir wheelhouse .; \
+	done
+
 clean:
-	rm -rf .cache .venv .venv-* build docs/_build install log *.egg-info
+	rm -rf .cache .venv .venv-* build wheelhouse docs/_build install log *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

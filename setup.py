@@ -99,14 +99,36 @@ CORE = Path(package_name, 'core')
 # The same bits on all processors of a kind: no product is fused into a sum, no sum is reordered.
 FLAGS = ('-std=gnu99', '-O3', '-fPIC', '-ffp-contract=off', '-fno-math-errno',
          '-fno-trapping-math', '-Wno-psabi', '-Wno-unknown-warning-option')
+# Other systems for which $WHEEL_PLATFORM makes a wheel, by its tag, as targets of ziglang.
+TARGETS = {
+    'manylinux_2_17_x86_64': 'x86_64-linux-gnu.2.17',
+    'manylinux_2_17_aarch64': 'aarch64-linux-gnu.2.17',
+    'manylinux_2_31_armv7l': 'arm-linux-gnueabihf.2.31',
+    'manylinux_2_31_riscv64': 'riscv64-linux-gnu.2.31',
+    'musllinux_1_2_x86_64': 'x86_64-linux-musl',
+    'musllinux_1_2_aarch64': 'aarch64-linux-musl',
+    'macosx_10_13_x86_64': 'x86_64-macos.10.13',
+    'macosx_11_0_arm64': 'aarch64-macos.11.0',
+}
+WHEEL_PLATFORM = os.environ.get('WHEEL_PLATFORM', '')
+if WHEEL_PLATFORM and WHEEL_PLATFORM not in TARGETS:
+    raise SystemExit(f'{package_name}: WHEEL_PLATFORM: {WHEEL_PLATFORM!r}: must be one of '
+                     f'{", ".join(TARGETS)}')
 # Versions of lanes.c: the suffix of its function, its lanes, what the processor must have.
 VERSIONS = {'baseline': (2, ())}
-if platform.machine() in ('x86_64', 'AMD64', 'amd64'):
+if (TARGETS[WHEEL_PLATFORM].partition('-')[0] if WHEEL_PLATFORM else platform.machine()) in (
+        'x86_64', 'AMD64', 'amd64'):
     VERSIONS |= {'avx2': (4, ('-mavx2',)), 'avx512': (8, ('-mavx512f', '-mavx512dq'))}
 
 
 def c_compiler() -> list[str]:
     """Return the command of a C compiler: $CC, the system's, or that of the package ziglang."""
+    # The defaults of ziglang are this very processor, and checks of undefined behavior.
+    ziglang = [sys.executable, '-m', 'ziglang', 'cc', '-mcpu=baseline', '-fno-sanitize=undefined']
+    if WHEEL_PLATFORM:
+        if find_spec('ziglang'):
+            return [*ziglang, '-target', TARGETS[WHEEL_PLATFORM], '-Wl,-s']
+        raise SystemExit(f'{package_name}: WHEEL_PLATFORM: needs the package ziglang from PyPI')
     for name in (os.environ.get('CC', ''), 'cc', 'gcc', 'clang'):
         command = shlex.split(name)
         if command and shutil.which(command[0]) and subprocess.run(
@@ -114,8 +136,7 @@ def c_compiler() -> list[str]:
                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0:
             return command
     if find_spec('ziglang'):
-        # Its defaults are this very processor, and checks of undefined behavior.
-        return [sys.executable, '-m', 'ziglang', 'cc', '-mcpu=baseline', '-fno-sanitize=undefined']
+        return ziglang
     raise SystemExit(
         f'{package_name}: found no C compiler: install one (Debian and Ubuntu: apt install gcc '
         'libc6-dev); or, for builds without isolation, the package ziglang from PyPI')
@@ -159,6 +180,8 @@ class Wheel(bdist_wheel):
 
     def get_tag(self) -> tuple[str, str, str]:
         """Return the tags of Python, ABI and system."""
+        if WHEEL_PLATFORM:
+            return 'py3', 'none', WHEEL_PLATFORM
         *_, system = super().get_tag()
         library = next(Path(self.bdist_dir, CORE).glob('*.so'), None) if self.bdist_dir else None
         if library and system.startswith('linux_'):
@@ -177,6 +200,8 @@ setup(
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
+    # A build for this system does not meet the library of another one.
+    options={'build': {'build_base': f'build/{WHEEL_PLATFORM}'}} if WHEEL_PLATFORM else {},
     ext_modules=[Extension(f'{package_name}.core.library', [str(CORE / 'library.c')],
                            depends=sorted(map(str, CORE.glob('*.[ch]'))))],
     cmdclass={'build_ext': BuildCore} | (
