@@ -109,7 +109,8 @@ class LegKind(ABC):
     extremes : tuple of str
         Names of the smallest and of the largest position.
     decimals : int
-        Decimals of efforts and powers in tables: torques of small servos are a few mN m.
+        Decimals of efforts and powers in tables; -1: four digits of the largest, as torques are
+        hundreds of N m or, of small servos, a few mN m.
     position_limits : tuple of str
         Limits of the drive's position, the smallest and the largest.
     rate_limit, effort_limit : str
@@ -132,8 +133,8 @@ class LegKind(ABC):
         Efforts in another unit, by those in the right one, and in words.
     right_sign : str
         Effect that a positive effort must have.
-    gear : str
-        Parts between motor and drive.
+    gear, transmission : str
+        The part between motor and drive, and all of them.
     ratio : str
         The parameter without which there are no motors; empty: not needed.
     own : tuple of str
@@ -183,6 +184,7 @@ class LegKind(ABC):
     width: int = _RESULT['joint_forces'].stop
     right_sign: str
     gear: str
+    transmission: str
     ratio: str = ''
     wrong_units: tuple[tuple[float, str], ...]
     own: tuple[str, ...]
