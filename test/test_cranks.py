@@ -269,7 +269,7 @@ def test_a_mirrored_machine_has_mirrored_angles() -> None:
 
 
 def one_crank_stretched(short: float) -> tuple[StewartPlatform, Pose]:
-    """Return the rig with rod 1 so long at home that its crank is stretched, but for a length."""
+    """Return the rig with a rod 1 that stretches its crank at home, but for a length."""
     p = Parameters.from_yaml('config/crank_platform.yaml')
     home = StewartPlatform(p).home_pose()
     u, c = p['geometry.crank_axes'][0], p.geometry.base_joints[0]

@@ -35,11 +35,12 @@ TELESCOPIC_FILE, CRANK_FILE = CONFIG / 'platform.yaml', CONFIG / 'crank_platform
 CRANKS = Parameters.from_yaml(CRANK_FILE)
 NOT_FOR_CRANKS = 'legs.crank.length: {}: available for telescopic legs alone'
 
+LINUXCNC = '--linuxcnc: genhexkins has lengths of legs'
 # Arguments of each program, and the feature that hexapods with cranks lack.
 PROGRAMS = {
     'stewart_calibrate poses.csv': 'calibration', 'stewart_calibrate --design 20': 'calibration',
     'stewart_cueing_report vehicle.csv': 'motion cueing',
-    'stewart_export --fmu --drives': '--drives', 'stewart_export --linuxcnc': '--linuxcnc',
+    'stewart_export --fmu --drives': '--drives', 'stewart_export --linuxcnc': LINUXCNC,
     'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification'}
 NODES = {
     f'stewart_cueing --ros-args --params-file {CRANK_FILE}': 'motion cueing',
@@ -92,7 +93,7 @@ CALLS: dict[str, Callable[[StewartPlatform], object]] = {
         platform.parameters, IdentificationOptions()),
     'identification ': lambda platform: design(platform.parameters, DesignOptions()),
     '--drives': lambda platform: drive_files(platform.parameters, 'rig'),
-    '--linuxcnc': lambda platform: hal_lines(platform.parameters),
+    LINUXCNC: lambda platform: hal_lines(platform.parameters),
     'motion cueing ': lambda platform: CueingParameters(
         platform.parameters.given, platform.parameters.source)}
 

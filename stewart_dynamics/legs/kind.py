@@ -126,7 +126,7 @@ class LegKind(ABC):
     simulated : str
         Value of the simulator's parameter ``commands`` for these efforts.
     resolved : str
-        What a step of the simulator may not do, besides turning the platform by a number.
+        Motions for which a step of the simulator is too long, besides a turn of the platform.
     width : int
         Numbers in a row of results: those of ``stewart_result`` up to the last of this kind.
     wrong_units : tuple
@@ -203,7 +203,7 @@ class LegKind(ABC):
     zero: str = ''
     likely: Mapping[str, Any] = {}
     inertia_unit: str  # of the reflected inertia of a drive
-    reflected: str  # what it is, in a formula
+    reflected: str  # its formula
     rotors: str  # and of which parts
     friction_units: tuple[str, str]  # viscous and Coulomb
     bodies: Mapping[str, str]  # of a leg, and the parameters of their masses
@@ -251,7 +251,7 @@ class LegKind(ABC):
     @abstractmethod
     def relative_changes(self, parameters: Parameters) -> Sequence[Array]:
         """
-        Return how ``mass_values`` (n, 6) change with what may be uncertain of a leg's parts.
+        Return how ``mass_values`` (n, 6) change with uncertain properties of a leg's parts.
 
         Each for a relative change of a mass, a center of mass, or an inertia.
         """
@@ -387,7 +387,7 @@ class LegKind(ABC):
 
     @abstractmethod
     def places(self, steps: Sequence[LegJoint]) -> list[str]:
-        """Return where each of these joints is, in words; the drive has none."""
+        """Return where each of these joints is, in words; empty for the drive."""
 
     @abstractmethod
     def parting(self, steps: Sequence[LegJoint]) -> int:

@@ -129,8 +129,8 @@ class _ServoPulses:
     """
     Writes the pulse widths of servos, for outputs whose efforts are published.
 
-    A pulse is a command: what suppresses the efforts suppresses it, too. There is none where an
-    angle is outside the points of its servo.
+    A pulse is a command, suppressed together with the efforts. Outputs with an angle outside the
+    points of its servo have no message.
     """
 
     def __init__(self, parameters: Parameters) -> None:

@@ -51,7 +51,7 @@ def servo_pulses(parameters: Parameters, positions: ArrayLike) -> Array:
 
 def outside_servos(parameters: Parameters, positions: Array) -> str:
     """
-    Return which position (6,) is farthest outside the points of its servo, and by what bounds.
+    Return the position, of six, that is farthest outside the points of its servo, and the bounds.
 
     Empty where all are between them.
     """
