@@ -88,7 +88,8 @@ def topics_of_foxglove(layout: str = LIVE) -> dict[str, str]:
             assert kind == 'Plot'
             for path in panel['paths']:
                 match = re.fullmatch(
-                    r'(/[a-z_/]+)\.((?:data|effort|position)(?:\[[0-5]\])?|wrench\.(?:force|torque)\.[xyz])',
+                    r'(/[a-z_/]+)\.((?:data|effort|position)(?:\[[0-5]\])?'
+                    r'|wrench\.(?:force|torque)\.[xyz])',
                     path['value'])
                 if match is None:
                     assert path['value'] == '0'  # a line at zero

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+import re
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -216,6 +217,28 @@ def test_a_known_drive_of_cranks_is_found_from_measured_angles(
     page = (tmp_path / 'results' / 'followed' / 'report.html').read_text()
     section = page.partition('<section id="response">')[2].partition('</section>')[0]
     assert section.count('<svg') == 6 + 1 + 12
+    check_words_of_cranks(page, summary)
+
+
+def check_words_of_cranks(page: str, summary: dict[str, Any]) -> None:
+    """Check names, units and digits in the report of a hexapod with cranks."""
+    used = page.partition('<section id="parameters">')[2].partition('</section>')[0]
+    rows = {re.sub('<.*?>', '', name): unit for name, unit in re.findall(
+        r'<tr><th scope="row">(.*?)</th>.*?<td>([^<]*)</td></tr>', used)}
+    assert rows['actuator.viscous_friction'] == 'N m s/rad'
+    assert rows['actuator.coulomb_friction'] == 'N m'
+    assert rows['limits.angle_max'] == 'rad'
+    assert not [name for name in rows if 'cylinder' in name or 'length_m' in name]
+    plots = set(re.findall(r'"title": ?"([^"]*)"', page))
+    assert {'Crank angles', 'Crank levers', 'Crank torques'} <= plots
+    text = re.sub('<.*?>', '', page.partition('<section id="peaks">')[2].partition(
+        '<section id="plots">')[0])
+    assert 'torques: + drives the angle up, powers: + drives.' in text
+    assert 'reflected inertia of the actuators' in text and 'screw' not in text
+    # Four digits of the largest torque, above 100 N m.
+    peak = max(abs(each['torque_peak_n_m']) for each in summary['legs'].values())
+    assert 100.0 < peak < 1000.0
+    assert f'{peak:.1f}' in text and f'{peak:.2f}' not in text
 
 
 def test_a_known_drive_is_found_from_measured_poses(followed: Path, tmp_path: Path) -> None:

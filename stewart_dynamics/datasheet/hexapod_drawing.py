@@ -140,7 +140,7 @@ class Drawing:
         return picture
 
     def oblique(self) -> Picture:
-        """Return an oblique view without dimensions; with the signs of drives that move anchors."""
+        """Return an oblique view without dimensions; with signs where drives move anchors."""
         picture, moving = Picture(300.0, 240.0, 'The hexapod'), self._anchors is not None
         place = self._fitted(OBLIQUE, picture, (OBLIQUE,), Margins(
             6.0, 26.0, 52.0, 26.0) if moving else Margins(6.0, 6.0, 12.0, 6.0))
@@ -150,7 +150,7 @@ class Drawing:
         return picture
 
     def _signs(self, picture: Picture, place: _Place, anchors: Array, tangents: Array) -> None:
-        """Draw arrows along which anchors move with positive rates, and the numbers of the legs."""
+        """Draw arrows along which anchors move with positive rates, and numbers of the legs."""
         begins, joints = place(OBLIQUE.of(anchors)), place(OBLIQUE.of(self._base))
         ends = place(OBLIQUE.of(anchors + _ARROW * tangents))
         for n, (begin, end, joint) in enumerate(zip(begins, ends, joints, strict=True)):

@@ -120,9 +120,9 @@ PUBLISHED = (
             '[motors](drives.md), named as the joints with `_motor` after it', 'drive.*'),
     _output(MOTOR_TORQUES, 'six torques, N m; remap it to the `commands` of an effort controller '
             'of the motors', 'drive.*'),
-    _output(SERVO_PULSES, 'pulse widths of six [hobby servos](real_time.md#hobby-servos), s, never '
-            'outside `servo.pulse_min` and `servo.pulse_max`; silent with the torques, and where an '
-            'angle is outside the two points of its servo', 'servo.*'),
+    _output(SERVO_PULSES, 'pulse widths of six [hobby servos](real_time.md#hobby-servos), s, '
+            'never outside `servo.pulse_min` and `servo.pulse_max`; not published without '
+            'torques, and where an angle is outside the two points of its servo', 'servo.*'),
     Topic(planned.OUTPUT, planned.OUTPUT_TYPE,
           'answer to `~/platform_trajectory`, with its stamp and times: positions, velocities '
           'and effort of the legs; nothing when it is rejected', depth=LENGTH),
