@@ -86,9 +86,12 @@ class Drawing:
         self._platform = self._placed(pose, self._arms)
         lines = parameters.leg_kind.lines(parameters, pose.position, pose.rotation)
         # the begin of each line of force, where drives move it, and its path by a unit of theirs
-        self._anchors, self._tangents = (None, None) if lines.path is None else (
-            self._platform - lines.lengths[:, None] * lines.directions @ self._upright.T,
-            lines.path.tangents @ self._upright.T)
+        self._anchors: Array | None = None
+        self._tangents: Array | None = None
+        if lines.path is not None:
+            self._anchors = self._platform - (
+                lines.lengths[:, None] * lines.directions @ self._upright.T)
+            self._tangents = lines.path.tangents @ self._upright.T
         self._pivot: Array = np.empty((0, 3))
         if pivot is not None and np.any(pivot):
             self._pivot = self._placed(pose, pivot[None])

@@ -164,6 +164,9 @@ class Report:
             units={name: self._parameters.unit_of(name) or '' for name in PARAMETERS},
             most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS_OF_WRENCH,
             kind=self._kind, **_decimals(self._kind, summary['legs']),
+            wrench_decimals={part: decimals_of(self._kind.decimals, [
+                summary['base_wrench'][part][f'peak_{unit_key(unit)}']])
+                for part, unit in PARTS_OF_WRENCH.items()},
             keys=LegKeys.of(self._kind), key_of=key_of, unit_key=unit_key,
             percent=PERCENT, bandwidth=bandwidth, **_response_charts(followed),
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
