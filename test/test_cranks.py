@@ -389,7 +389,8 @@ def test_motors_turn_by_the_gear_ratio() -> None:
 
 
 @pytest.mark.parametrize(('distance', 'words'), [
-    (0.0042, '4.2 mm'), (0.2493, '249 mm'), (0.9985, '998 mm'), (0.9999, '1 m'), (4.087, '4.09 m')])
+    (0.0042, '4.2 mm'), (0.2493, '249 mm'), (0.9985, '998 mm'), (0.9999, '1 m'),
+    (4.087, '4.09 m')])
 def test_a_missing_distance_has_three_digits(distance: float, words: str) -> None:
-    distances = np.array([0.0, 0.001, distance, 0.0, 0.0, 0.0])
-    assert unreached([f'leg_{n}' for n in range(1, 7)], distances) == f'leg_3 cannot reach: {words} missing'
+    distances, names = np.array([0.0, 0.001, distance, 0.0, 0.0, 0.0]), 'abcdef'
+    assert unreached(names, distances) == f'c cannot reach: {words} missing'
