@@ -380,6 +380,11 @@ def test_servos_get_pulses_within_their_points_and_none_elsewhere(
     assert [bits(deserialize_message(data, Float64MultiArray).data) for topic, _, data in recorded(
         tmp_path / 'results' / 'bag' / 'bag' / 'bag.mcap') if topic == 'servo_pulses'] == [
             bits(deserialize_message(each, Float64MultiArray).data) for each in pulses]
+    summary = json.loads((tmp_path / 'results' / 'bag' / 'summary.json').read_text())
+    notice, = (each for each in summary['notices'] if each.startswith('servo_pulses: '))
+    assert notice.startswith('servo_pulses: none for 1 of the setpoints, first at t = ')
+    assert words.removeprefix('no servo_pulses: ') in notice
+    assert summary['limit_met']
 
 
 def test_pulses_are_suppressed_with_the_torques(start: Start, tmp_path: Path) -> None:
