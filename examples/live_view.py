@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Example: the hexapod live in a browser, with the use of its force limits and its warnings.
+Example: the hexapod live in a browser, with the use of its drives' limits and its warnings.
 
 It reads ~/markers, which the node makes at visualization_rate (30 Hz) after its answers, and
 /diagnostics: no topic at the rate of the setpoints. Needs websockets.
@@ -29,6 +29,7 @@ from stewart_dynamics.messages.received import checked_numbers, ReceivedError, s
 from visualization_msgs.msg import Marker, MarkerArray
 
 PAGE = Path(__file__).with_name('live_view.html')
+OTHERS = 'platform', 'base', 'singularity', 'names'  # namespaces of markers that are no legs
 LEVELS = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.WARN: 'WARN',
           DiagnosticStatus.ERROR: 'ERROR', DiagnosticStatus.STALE: 'STALE'}
 MOST_STATUSES = 100
@@ -64,9 +65,12 @@ class View(Node):
 
 def picture_of(markers: dict[tuple[str, int], Marker]) -> dict[str, object]:
     """Return the numbers and texts of the page; raise ReceivedError without all of its markers."""
+    # The cylinders of which the legs consist: cylinders and pistons, or cranks and rods.
+    parts = list(dict.fromkeys(name for name, _ in markers if name not in OTHERS))[:10]
     needed = [('platform', 1), ('base', 1), ('singularity', 0),
-              *((part, n) for part in ('names', 'pistons') for n in range(6))]
+              *((part, n) for part in ('names', *parts) for n in range(6))]
     missing = [f'{name} {n}' for name, n in needed if (name, n) not in markers]
+    missing += [] if parts else ['legs']
     if missing:
         raise ReceivedError(f'lacks {", ".join(missing)}')
 
@@ -76,14 +80,25 @@ def picture_of(markers: dict[tuple[str, int], Marker]) -> dict[str, object]:
         return [numbers[n:n + 3] for n in range(0, 18, 3)]
 
     position, q = markers['platform', 1].pose.position, markers['platform', 1].pose.orientation
-    colors = [markers['pistons', n].color for n in range(6)]
+    colors = [markers[parts[-1], n].color for n in range(6)]
     return {
         'base': points('base'), 'joints': points('platform'),
         'position': checked_numbers('position', [position.x, position.y, position.z], 3),
         'orientation': checked_numbers('orientation', [q.x, q.y, q.z, q.w], 4),
         'names': [shown_text(markers['names', n].text) for n in range(6)],
+        'bodies': [[ends_of(markers[part, n]) for n in range(6)] for part in parts],
         'colors': [checked_numbers('color', [c.r, c.g, c.b], 3, 1.0) for c in colors],
         'text': '\n'.join(map(shown_text, markers['singularity', 0].text.split('\n')[:100]))}
+
+
+def ends_of(cylinder: Marker) -> list[list[float]]:
+    """Return both ends of the axis of a cylinder [m], and its diameter."""
+    at, q, size = cylinder.pose.position, cylinder.pose.orientation, cylinder.scale
+    x, y, z, w, cx, cy, cz, diameter, length = checked_numbers(
+        cylinder.ns, [q.x, q.y, q.z, q.w, at.x, at.y, at.z, size.x, size.z], 9)
+    axis = (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y))
+    return [*([c + side * length * part for c, part in zip((cx, cy, cz), axis, strict=True)]
+              for side in (-0.5, 0.5)), [diameter]]
 
 
 def is_own(hosts: list[str], origins: list[str]) -> bool:

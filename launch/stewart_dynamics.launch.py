@@ -18,6 +18,7 @@ from stewart_dynamics.ros.launch_arguments import check_files, check_launch_argu
 TOPICS = {
     'leg_forces': 'topic of the leg forces, as the commands of an effort controller',
     'leg_torques': 'topic of the torques of cranks, as the commands of an effort controller',
+    'servo_pulses': 'topic of the pulse widths of servos, as that of their driver',
     'leg_trajectory': 'topic of the leg trajectories, as that of a joint_trajectory_controller',
     'measured_legs': 'topic of the measured legs, as /joint_states'}
 

@@ -56,6 +56,7 @@ MARKERS = 'visualization_msgs/msg/MarkerArray'
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 FIELDS = {
     'data': 'std_msgs/msg/Float64', 'data[n]': 'std_msgs/msg/Float64MultiArray',
+    'effort[n]': 'sensor_msgs/msg/JointState', 'position[n]': 'sensor_msgs/msg/JointState',
     'wrench.force.x': 'geometry_msgs/msg/WrenchStamped',
     'wrench.torque.x': 'geometry_msgs/msg/WrenchStamped'}
 
@@ -87,7 +88,8 @@ def topics_of_foxglove(layout: str = LIVE) -> dict[str, str]:
             assert kind == 'Plot'
             for path in panel['paths']:
                 match = re.fullmatch(
-                    r'(/[a-z_/]+)\.(data(?:\[[0-5]\])?|wrench\.(?:force|torque)\.[xyz])',
+                    r'(/[a-z_/]+)\.((?:data|effort|position)(?:\[[0-5]\])?'
+                    r'|wrench\.(?:force|torque)\.[xyz])',
                     path['value'])
                 if match is None:
                     assert path['value'] == '0'  # a line at zero
@@ -104,15 +106,17 @@ def test_rviz_shows_every_namespace_of_the_markers_in_the_base_frame() -> None:
 
     from stewart_dynamics.node.markers import Markers
     from stewart_dynamics.setpoints.step import Batch, Step
-    parameters = Parameters.from_yaml(CONFIG / 'platform.yaml')
-    home = Batch.of(1, (0.0, 0.0, 1.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, *(0.0,) * 12))
-    message = rclpy.deserialize_message(Markers(parameters).write(
-        home, Step(parameters)(home)), MarkerArray)
+    markers = []
+    for name, height in (('platform.yaml', 1.1), ('crank_platform.yaml', 0.65)):
+        parameters = Parameters.from_yaml(CONFIG / name)
+        home = Batch.of(1, (0.0, 0.0, height, *np.eye(3).ravel(), *(0.0,) * 12))
+        message = rclpy.deserialize_message(Markers(parameters).write(
+            home, Step(parameters)(home)), MarkerArray)
+        markers += message.markers
     display, = (each for each in rviz()['Displays'] if each['Class'].endswith('/MarkerArray'))
-    assert display['Namespaces'] == dict.fromkeys(
-        {marker.ns for marker in message.markers}, True)
+    assert display['Namespaces'] == dict.fromkeys({marker.ns for marker in markers}, True)
     assert {rviz()['Global Options']['Fixed Frame']} == {
-        marker.header.frame_id for marker in message.markers} == {parameters['base_frame']}
+        marker.header.frame_id for marker in markers} == {parameters['base_frame']}
 
 
 def test_the_layout_for_bags_shows_topics_of_the_output_bag(tmp_path: Path) -> None:
@@ -132,7 +136,7 @@ def test_topics_are_those_that_the_node_publishes(node: Any) -> None:
 
     shown = {**topics_of_rviz(), **topics_of_foxglove()}
     del shown[ROBOT_DESCRIPTION]  # of robot_state_publisher
-    assert {'/stewart_dynamics/markers', '/stewart_dynamics/leg_forces',
+    assert {'/stewart_dynamics/markers', '/stewart_dynamics/leg_states',
             '/stewart_dynamics/jacobian_determinant', '/diagnostics', MONITOR} <= set(shown)
     node.until(lambda: all(published(topic) for topic in set(shown) - {MONITOR}),
                'its topics are known')

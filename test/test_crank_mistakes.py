@@ -208,3 +208,18 @@ def test_mistakes_of_a_hexapod_that_cannot_be_assembled_are_not_followed_by_othe
     """A StewartPlatform of it raises the error; the check has nothing to say of poses."""
     undecided = RIG.replaced({'limits.angle_min': -4.0, 'limits.angle_max': 4.0})
     assert likely_mistakes(undecided) == ()
+
+
+@pytest.mark.parametrize(('limits', 'found'), [
+    ({}, '-1.047 rad, 1.047 rad'),
+    ({'limits.angle_min': None, 'limits.angle_max': None}, 'not set, not set'),
+    ({'limits.angle_min': -0.8, 'limits.angle_max': 0.8}, '')])
+def test_limits_of_angles_beyond_a_servo_are_named(limits: dict[str, Any], found: str) -> None:
+    """Travel, datasheet and home know limits; a servo that ends before them gets no pulses."""
+    rig = RIG.replaced({
+        'servo.angle_at_min': [-1.2, 1.2, -1.2, 0.9, -1.2, 1.2],
+        'servo.angle_at_max': [1.2, -1.2, 1.2, -1.1, 1.2, -1.2], **limits})
+    words = likely_mistakes(rig)
+    assert len(words) == bool(found)
+    assert all(found in each and 'leg_4' in each and 'servo turns from -1.1 to 0.9 rad' in each
+               for each in words)

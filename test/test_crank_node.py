@@ -86,6 +86,8 @@ def test_answers_have_the_bits_of_the_library_and_of_the_replay(
             node.rejects('setpoint', 'out of reach')
         stamp = node.send(sample)
         sent.append((sample, stamp))
+        if n % 50 == 49:  # no more wait than can be answered
+            node.state_of(stamp)
     states = [node.state_of(stamp) for sample, stamp in sent if sample is not TOO_HIGH]
     for sample, state in zip(samples, states, strict=True):
         node.check(state, node.result_of(sample))
@@ -323,3 +325,85 @@ def test_travel_is_published(node: DynamicsNode) -> None:
     expected = [Capability(PLATFORM).travel(PLATFORM.home_pose(), sign * np.eye(6)).value
                 for sign in (-1.0, 1.0)]
     assert np.array(message.data).reshape(6, 2).T == pytest.approx(np.array(expected))
+
+
+SERVOS: dict[str, Any] = {  # mirrored cranks turn the other way; the fourth ends first
+    'pulse_min': [0.0005, 0.0006, 0.0005, 0.0009, 0.001, 0.0005],
+    'pulse_max': [0.0025, 0.0024, 0.0025, 0.0021, 0.002, 0.0025],
+    'angle_at_min': [-1.1, 1.2, -1.3, 0.3, -0.8, 1.1],
+    'angle_at_max': [1.3, -1.1, 1.2, -1.1, 0.9, -1.2]}
+
+
+def test_servos_get_pulses_within_their_points_and_none_elsewhere(
+        start: Start, tmp_path: Path) -> None:
+    file = tmp_path / 'rig.yaml'
+    file.write_text(CRANKS.read_text() + f'    servo: {json.dumps(SERVOS)}\n')
+    platform = StewartPlatform.from_yaml(file)
+    node = start(file=file)
+    pulses = node.peer.listen(f'{NODE}/servo_pulses', Float64MultiArray)
+    node.until_active()
+    node.until(lambda: node.peer.node.count_publishers(f'{NODE}/servo_pulses') == 1, 'it is there')
+    samples = [swaying(n) for n in range(0, 100, 5)]
+    sent = [(sample, node.send(sample)) for sample in samples]
+    for _, stamp in sent:
+        node.state_of(stamp)
+    expected = platform.servo_pulses(
+        [node.result_of(sample, platform=platform).angles for sample in samples])
+    node.until(lambda: len(pulses) == len(samples), 'all come')
+    found = [deserialize_message(each, Float64MultiArray).data for each in pulses]
+    assert [bits(each) for each in found] == [bits(each) for each in expected]
+    low, high = (np.array(SERVOS[f'pulse_{end}']) for end in ('min', 'max'))
+    assert (np.array(found) >= low).all() and (np.array(found) <= high).all()
+
+    # Within the limits of angles, outside the points of one servo: angles, and no pulses.
+    outside = Sample((0.0, 0.0, HEIGHT + 0.06))
+    angle = platform.inverse_kinematics(outside.motion())[3]
+    assert SERVOS['angle_at_min'][3] < angle < platform.parameters['limits.angle_max'][3]
+    sent.append((outside, node.send(outside, stamp=node.stamp(LATER))))
+    node.state_of(sent[-1][1])
+    words = (f'no servo_pulses: {JOINTS[3]}: angle {angle:.6g} rad: must be between '
+             'servo.angle_at_min and servo.angle_at_max, -1.1 and 0.3')
+    node.until_status('limits', ERROR, words)
+    node.until_said(words)
+    assert node.values('limits')['setpoints outside the points of servos'] == '1'
+    sent.append((TOO_HIGH, node.send(TOO_HIGH)))
+    node.rejects('setpoint', 'out of reach')
+    sent.append((HOME, node.send(HOME, stamp=node.stamp(LATER))))
+    node.state_of(sent[-1][1])
+    node.until(lambda: len(pulses) == len(samples) + 1, 'the next one')
+    node.until_status('limits', OK, 'all held')
+
+    bag = write_bag(tmp_path / 'bag', [
+        (f'{NODE}/{topic}', stamp, serialize_message(message)) for sample, stamp in sent
+        for topic, message in sample.messages(stamp).items()])
+    assert replay([str(bag), '--params', str(file), '--output', str(tmp_path / 'results')]) == 0
+    assert [bits(deserialize_message(data, Float64MultiArray).data) for topic, _, data in recorded(
+        tmp_path / 'results' / 'bag' / 'bag' / 'bag.mcap') if topic == 'servo_pulses'] == [
+            bits(deserialize_message(each, Float64MultiArray).data) for each in pulses]
+    summary = json.loads((tmp_path / 'results' / 'bag' / 'summary.json').read_text())
+    notice, = (each for each in summary['notices'] if each.startswith('servo_pulses: '))
+    assert notice.startswith('servo_pulses: none for 1 of the setpoints, first at t = ')
+    assert words.removeprefix('no servo_pulses: ') in notice
+    assert summary['limit_met']
+
+
+def test_pulses_are_suppressed_with_the_torques(start: Start, tmp_path: Path) -> None:
+    file = tmp_path / 'rig.yaml'
+    file.write_text(CRANKS.read_text().replace('angle_max: 1.0471975511965976', 'angle_max: 0.25')
+                    + f'    servo: {json.dumps(SERVOS)}\n')
+    node = start('limits.action:=suppress_forces', file=file)
+    node.platform = StewartPlatform.from_yaml(file)
+    pulses = node.peer.listen(f'{NODE}/servo_pulses', Float64MultiArray)
+    node.until_active()
+    node.until(lambda: node.peer.node.count_publishers(f'{NODE}/servo_pulses') == 1, 'it is there')
+    home = Sample(tuple(node.platform.home_pose().position.tolist()))  # type: ignore[arg-type]
+    node.state_of(node.send(home))
+    node.until(lambda: len(pulses) == 1, 'they come')
+    high = Sample((0.0, 0.0, HEIGHT + 0.05))
+    angles = node.platform.inverse_kinematics(high.motion())
+    assert (angles > 0.25).all() and (angles < 0.3).all()
+    stamp = node.send(high, stamp=node.stamp(LATER))
+    assert not len(node.state_of(stamp).effort)
+    node.state_of(node.send(home, stamp=node.stamp(LATER)))
+    node.until(lambda: len(pulses) == 2, 'the next one')
+    assert pulses[0] == pulses[1]

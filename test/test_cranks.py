@@ -18,6 +18,7 @@ import pytest
 from referees import derivative, relative, rng, rotation_about
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError, ReachError, SingularityError
+from stewart_dynamics.mechanics.batch import unreached
 from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters
 
 RIG = json.loads(Path(__file__).with_name('data').joinpath('simulator_rig.json').read_text())
@@ -269,7 +270,7 @@ def test_a_mirrored_machine_has_mirrored_angles() -> None:
 
 
 def one_crank_stretched(short: float) -> tuple[StewartPlatform, Pose]:
-    """Return the rig with rod 1 so long at home that its crank is stretched, but for a length."""
+    """Return the rig with a rod 1 that stretches its crank at home, but for a length."""
     p = Parameters.from_yaml('config/crank_platform.yaml')
     home = StewartPlatform(p).home_pose()
     u, c = p['geometry.crank_axes'][0], p.geometry.base_joints[0]
@@ -385,3 +386,11 @@ def test_motors_turn_by_the_gear_ratio() -> None:
     assert relative(motors.currents, result.torques / 5.0) < EXACT
     with pytest.raises(ParameterError, match='contradicts drive.motor_inertia, with which'):
         p.replaced({'actuator.reflected_inertia': 0.31})
+
+
+@pytest.mark.parametrize(('distance', 'words'), [
+    (0.0042, '4.2 mm'), (0.2493, '249 mm'), (0.9985, '998 mm'), (0.9999, '1 m'),
+    (4.087, '4.09 m')])
+def test_a_missing_distance_has_three_digits(distance: float, words: str) -> None:
+    distances, names = np.array([0.0, 0.001, distance, 0.0, 0.0, 0.0]), 'abcdef'
+    assert unreached(names, distances) == f'c cannot reach: {words} missing'

@@ -109,8 +109,11 @@ def test_the_page_has_angles_levers_and_torques(sheet: Path, figures: dict[str, 
     text = re.sub(r'<[^>]+>', ' ', (sheet / 'datasheet.html').read_text())
     for words in ('angle [°]', 'lever [%]', 'torque at rest [kg cm]', '−60 to 60',
                   'Leg: crank, rod', 'Reflected inertia of an actuator', 'keeps its angle',
-                  'Drives of 20.00 N m/mrad', 'An angle is at 0 %'):
+                  'Drives of 20.00 N m/mrad', 'An angle is at 0 %', 'arrows: positive angles',
+                  'by the largest speed of a crank or motor',
+                  'by the largest torque of a crank or torque of a motor'):
         assert words in text, words
+    assert 'of a leg' not in text and 'longest' not in text
     torque = figures['drives']['torques'][0] / KG_CM
     assert f'{torque:.2f}' in text
     assert f'{250.0 / KG_CM:.1f} kg cm' in text
@@ -120,6 +123,7 @@ def test_torques_are_in_newton_metres_by_default(tmp_path: Path) -> None:
     assert main(['--params', str(FILE), '--output', str(tmp_path / 'sheet')]) == 0
     text = re.sub(r'<[^>]+>', ' ', (tmp_path / 'sheet' / 'datasheet.html').read_text())
     assert 'torque at rest [N m]' in text
+    assert 'largest angle' in text and 'smallest angle' in text
     assert 'kg cm' not in text
 
 

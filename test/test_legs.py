@@ -29,20 +29,19 @@ from stewart_dynamics.legs import CRANK, require_kind, TELESCOPIC
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.planned.trajectory_messages import answer, NOT_AVAILABLE
 from stewart_dynamics.program import BAD_INPUT
-from stewart_dynamics.response.recorded_response import RecordedResponse
 
 CONFIG = ROOT / 'config'
 TELESCOPIC_FILE, CRANK_FILE = CONFIG / 'platform.yaml', CONFIG / 'crank_platform.yaml'
 CRANKS = Parameters.from_yaml(CRANK_FILE)
 NOT_FOR_CRANKS = 'legs.crank.length: {}: available for telescopic legs alone'
 
+LINUXCNC = '--linuxcnc: genhexkins has lengths of legs'
 # Arguments of each program, and the feature that hexapods with cranks lack.
 PROGRAMS = {
     'stewart_calibrate poses.csv': 'calibration', 'stewart_calibrate --design 20': 'calibration',
     'stewart_cueing_report vehicle.csv': 'motion cueing',
-    'stewart_export --fmu --drives': '--drives', 'stewart_export --linuxcnc': '--linuxcnc',
-    'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification',
-    'stewart_replay bag --response --measured /legs': 'responses'}
+    'stewart_export --fmu --drives': '--drives', 'stewart_export --linuxcnc': LINUXCNC,
+    'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification'}
 NODES = {
     f'stewart_cueing --ros-args --params-file {CRANK_FILE}': 'motion cueing',
     'stewart_trajectory --ros-args -p motion.type:=response -p '
@@ -82,11 +81,6 @@ def planned(platform: StewartPlatform) -> object:
         platform, [0.0, 1.0], Motion.from_pose(Pose(np.zeros((2, 3)), [np.eye(3)] * 2)))
 
 
-def responses(platform: StewartPlatform) -> object:
-    return RecordedResponse(
-        platform.parameters, {'measured': '/legs'}, lambda *rejected: None)
-
-
 CALLS: dict[str, Callable[[StewartPlatform], object]] = {
     'clearance between legs': lambda platform: Capability(platform).clearance(
         platform.home_pose()),
@@ -99,8 +93,7 @@ CALLS: dict[str, Callable[[StewartPlatform], object]] = {
         platform.parameters, IdentificationOptions()),
     'identification ': lambda platform: design(platform.parameters, DesignOptions()),
     '--drives': lambda platform: drive_files(platform.parameters, 'rig'),
-    '--linuxcnc': lambda platform: hal_lines(platform.parameters),
-    'responses': responses,
+    LINUXCNC: lambda platform: hal_lines(platform.parameters),
     'motion cueing ': lambda platform: CueingParameters(
         platform.parameters.given, platform.parameters.source)}
 

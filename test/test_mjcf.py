@@ -196,7 +196,7 @@ def test_accelerations_by_mujocos_dynamics_with_closed_loops_are_the_same(seed, 
     p, motions = random_hexapod(kind, seed, 20)
     p = sharp(p)
     platform, simulation = StewartPlatform(p), Simulation(p)
-    # Legs have none about their own axes in the model: as it is written, it changes accelerations
+    # The model has no inertia of legs about their own axes: the written one changes accelerations
     # of fast cranks by up to 2e-6.
     for part in (leg.last.name for leg in Hexapod(p).legs):
         moments = simulation.model.body_inertia[simulation.model.body(part).id]

@@ -201,3 +201,5 @@ def test_the_picture_shows_the_direction_of_positive_angles(
     texts = [each.text or '' for each in tree.iter(f'{SVG}text')]
     assert 'angle at home [rad]' in texts
     assert any(text.startswith('Discs') and 'growing angle' in text for text in texts)
+    # A line of 900 px is cut off where it is longer.
+    assert max(map(len, texts)) < 120

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+import re
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,6 +46,7 @@ MOTION = ReferenceMotionParameters({
     'motion.response.periods': 3.0, 'motion.response.highest_frequency': 10.0})
 START = 1_700_000_000_000_000_000
 LEGS, TRACKER = '/stewart_dynamics/measured_legs', '/tracker/pose'
+CRANK_FILE = ROOT / 'config' / 'crank_platform.yaml'
 JOINT_STATE, POSE = 'sensor_msgs/msg/JointState', 'geometry_msgs/msg/PoseStamped'
 
 
@@ -114,8 +116,9 @@ def write_bag(folder: Path, commanded: Motion, times: Array,
     return folder
 
 
-def replayed(bag: Path, output: Path, *options: str, code: int = 0) -> dict[str, Any]:
-    assert main([str(bag), '--params', str(PARAMS), '--response', '--output', str(output),
+def replayed(bag: Path, output: Path, *options: str, code: int = 0,
+             params: Path = PARAMS) -> dict[str, Any]:
+    assert main([str(bag), '--params', str(params), '--response', '--output', str(output),
                  *options]) == code
     found: dict[str, Any] = json.loads((output / bag.name / 'summary.json').read_text())
     return found
@@ -180,6 +183,62 @@ def test_a_known_drive_is_found_from_measured_legs(followed: Path, tmp_path: Pat
     page = (tmp_path / 'followed' / 'report.html').read_text()
     section = page.partition('<section id="response">')[2].partition('</section>')[0]
     assert section.count('<svg') == 6 + 1 + 12
+
+
+def test_a_known_drive_of_cranks_is_found_from_measured_angles(
+        commanded: tuple[Array, Motion], tmp_path: Path) -> None:
+    """The axes follow as the drive does, with angles that are as linear as the travel is small."""
+    rig = StewartPlatform.from_yaml(CRANK_FILE)
+    home = rig.home_pose()
+    times, about = commanded
+    axes = offsets(about)
+    setpoints = Motion(
+        home.position + axes[:, :3], about.rotation, *np.split(about.rows[:, 12:], 4, axis=1))
+    moved = DRIVE.moved(axes, MOTION['rate'])
+    achieved = Pose(home.position + moved[:, :3], from_rotation_vector(moved[:, 3:]))
+    angles = rig.inverse_kinematics(achieved)
+    lost = np.arange(1000, 1010)
+    angles[lost] = np.array([3.0, -3.0] * 3) + 1e-3 * rng(1).normal(size=(len(lost), 6))  # no pose
+    bag = write_bag(tmp_path / 'followed', setpoints, times, {LEGS: (angles, times)})
+    summary = replayed(bag, tmp_path / 'results', params=CRANK_FILE)
+    response = summary['response']
+    assert summary['complete'] and response['topic'] == LEGS
+    assert [(each['reason'], each['count']) for each in summary['rejected']] == [
+        ('no pose has these angles', len(lost))]
+    for name in AXES:
+        check(response[name], DRIVE)
+        assert response[name]['second_order'] == pytest.approx({
+            'gain': 1.0, 'delay': DRIVE.delay, 'damping': DRIVE.damping,
+            'natural_frequency': DRIVE.frequency}, rel=0.01)
+    assert list(response['legs']) == list(rig.parameters.joints)
+    for one in response['legs'].values():
+        check(one, DRIVE)
+    assert response['leg_balance']['phase_difference'] < 0.1
+    page = (tmp_path / 'results' / 'followed' / 'report.html').read_text()
+    section = page.partition('<section id="response">')[2].partition('</section>')[0]
+    assert section.count('<svg') == 6 + 1 + 12
+    check_words_of_cranks(page, summary)
+
+
+def check_words_of_cranks(page: str, summary: dict[str, Any]) -> None:
+    """Check names, units and digits in the report of a hexapod with cranks."""
+    used = page.partition('<section id="parameters">')[2].partition('</section>')[0]
+    rows = {re.sub('<.*?>', '', name): unit for name, unit in re.findall(
+        r'<tr><th scope="row">(.*?)</th>.*?<td>([^<]*)</td></tr>', used)}
+    assert rows['actuator.viscous_friction'] == 'N m s/rad'
+    assert rows['actuator.coulomb_friction'] == 'N m'
+    assert rows['limits.angle_max'] == 'rad'
+    assert not [name for name in rows if 'cylinder' in name or 'length_m' in name]
+    plots = set(re.findall(r'"title": ?"([^"]*)"', page))
+    assert {'Crank angles', 'Crank levers', 'Crank torques'} <= plots
+    text = re.sub('<.*?>', '', page.partition('<section id="peaks">')[2].partition(
+        '<section id="plots">')[0])
+    assert 'torques: + drives the angle up, powers: + drives.' in text
+    assert 'reflected inertia of the actuators' in text and 'screw' not in text
+    # Four digits of the largest torque, above 100 N m.
+    peak = max(abs(each['torque_peak_n_m']) for each in summary['legs'].values())
+    assert 100.0 < peak < 1000.0
+    assert f'{peak:.1f}' in text and f'{peak:.2f}' not in text
 
 
 def test_a_known_drive_is_found_from_measured_poses(followed: Path, tmp_path: Path) -> None:

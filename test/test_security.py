@@ -113,7 +113,7 @@ def done_beside(peer: Peer) -> dict[str, set[str]]:
 
 
 DRIVES = 'actuator.screw_lead:=0.005', 'drive.torque_max:=100.0'
-OF_CRANKS = {f'{NODE}/leg_angles', f'{NODE}/leg_torques'}
+OF_CRANKS = {f'{NODE}/{topic}' for topic in ('leg_angles', 'leg_torques', 'servo_pulses')}
 SWAY = 'base_motion.amplitude:=[0.0, 0.01, 0.0, 0.0, 0.0, 0.0]', 'base_motion.frequency:=[0.2]'
 COMMANDS = {'leg_controller': [sys.executable, ROOT / 'examples' / 'leg_controller.py']}
 LAST = {'stewart_simulator': '/stewart_simulator/wrench',
@@ -165,7 +165,8 @@ def test_the_policy_has_the_topics_of_cranks(domain: int, tmp_path: Path) -> Non
     peer = Peer(domain)
     program = Program(
         [executable('stewart_dynamics'), '--ros-args', '--params-file',
-         ROOT / 'config' / 'crank_platform.yaml'], domain, tmp_path)
+         ROOT / 'config' / 'crank_platform.yaml', '-p', 'servo.angle_at_min:=[-1.1]',
+         '-p', 'servo.angle_at_max:=[1.1]'], domain, tmp_path)
     peer.watched = program
     try:
         peer.until(lambda: done_beside(peer).get('publish', set()) >= OF_CRANKS, 'its topics')

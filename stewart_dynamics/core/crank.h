@@ -338,7 +338,7 @@ static double crank_position(
 }
 
 /* (k / L1)' = n . B' / L2 - q' (L1 / L2 + d . e): no division by k. */
-static lever_slope crank_slope_at(const stewart_leg * leg, const crank_pose * at) {
+static lever_slope crank_slope(const stewart_leg * leg, const crank_pose * at) {
   lever_slope of;
   double size = leg->crank_length, rod = leg->rod_length;
   of.ratio = leg->branch * at->line.lever / size;
@@ -347,21 +347,15 @@ static lever_slope crank_slope_at(const stewart_leg * leg, const crank_pose * at
   return of;
 }
 
-static lever_slope crank_slope(
-  const stewart_leg * leg, const double position[3], const double r[9]) {
-  crank_pose at = crank_pose_of(leg, position, r);
-  return crank_slope_at(leg, &at);
-}
-
 /* The lever is one of what changes, by its own magnitude: in half of it a step does not come to the
    dead centre, and not from one side of it to the other. */
 static measured_leg crank_measured(const stewart_leg * leg, const stewart_motion * motion) {
   crank_motion of = crank_motion_of(leg, motion);
-  lever_slope lever = crank_slope_at(leg, &of.at);
+  lever_slope lever = crank_slope(leg, &of.at);
   double lever_rate = lever.of_drive * of.drive.rate + dot(lever.of_joint, of.end_rate);
   double pace = largest(fabs(of.drive.rate), norm(of.end_rate) / leg->rod_length);
   if (lever_rate != 0.0) {pace = largest(pace, fabs(lever_rate) / lever.ratio);}
-  measured_leg to = {of.drive.position, of.drive.rate, HUGE_VAL};
+  measured_leg to = {of.drive.position, of.drive.rate, HUGE_VAL, lever};
   if (lever.ratio >= 0.0 && pace < HUGE_VAL) {to.pace = pace;}
   return to;
 }

@@ -15,6 +15,15 @@ void positions_many(
   }
 }
 
+void servo_pulses_many(
+  const stewart_platform * platform, int64_t count, const double * positions, double * pulses,
+  int64_t * codes) {
+  for (int64_t n = 0; n < count; n++) {
+    for (int i = 0; i < 6; i++) {pulses[6 * n + i] = NAN;}
+    codes[n] = stewart_servo_pulses(platform, &positions[6 * n], &pulses[6 * n]);
+  }
+}
+
 void missing_many(
   const stewart_platform * platform, int64_t count, const stewart_pose * poses,
   double * distances) {

@@ -48,16 +48,16 @@ typedef struct {
   vector arm, of_mass[MOST_COLUMNS];
 } leg_columns;
 
-/* A leg as it is measured, and how fast it changes [1/s]. */
-typedef struct { double position, rate, pace; } measured_leg;
-
 /* Magnitude of the lever by its largest, negative on the other side of a dead centre. Its rate is
    of_drive q' + of_joint . x', with the rate of the drive and the velocity of the platform joint. */
 typedef struct { double ratio, of_drive; vector of_joint; } lever_slope;
 
+/* A leg as it is measured, how fast it changes [1/s], and its lever. */
+typedef struct { double position, rate, pace; lever_slope lever; } measured_leg;
+
 /* Of a kind of legs, for the library:
    position: that of the drive, nan where it does not reach. drive_row: the row of J_q, with moments
-   times per_size. measured: in a motion. slope: of the lever. mass, columns: see the structures.
+   times per_size. measured: in a motion. mass, columns: see the structures.
    momentum_rate: of the leg's momentum, and of its moment of momentum about the base's origin. */
 #define STEWART_LIBRARY
 #include "telescopic.h"
@@ -82,13 +82,6 @@ static measured_leg measured_of(
   const stewart_platform * platform, int i, const stewart_motion * motion) {
   switch (platform->leg_kind) {
     default: STEWART_LEG_KINDS(RETURN, measured, (&platform->legs[i], motion))
-  }
-}
-
-static lever_slope lever_slope_of(
-  const stewart_platform * platform, int i, const double position[3], const double r[9]) {
-  switch (platform->leg_kind) {
-    default: STEWART_LEG_KINDS(RETURN, slope, (&platform->legs[i], position, r))
   }
 }
 

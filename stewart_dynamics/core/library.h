@@ -175,6 +175,12 @@ void positions_many(
   const stewart_platform * platform, int64_t count, const stewart_pose * poses,
   double * positions);
 
+/* Pulse widths (count, 6) [s] of servos at positions of the drives (count, 6), nan where the code is
+   not STEWART_OK: see stewart_servo_pulses. */
+void servo_pulses_many(
+  const stewart_platform * platform, int64_t count, const double * positions, double * pulses,
+  int64_t * codes);
+
 /* Distances (count, 6) by which legs miss the platform joints of poses [m]; 0: they reach them. */
 void missing_many(
   const stewart_platform * platform, int64_t count, const stewart_pose * poses,

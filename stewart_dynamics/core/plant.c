@@ -60,14 +60,14 @@ static double stop_effort(const end_stops * stops, int i, double position, doubl
    lever: to the effort of the drive, and to the wrench on the platform. */
 static void add_lever_stop(
   const stewart_platform * platform, const end_stops * stops, int i,
-  const stewart_motion * motion, double rate, double * effort, double wrench[6]) {
-  lever_slope lever = lever_slope_of(platform, i, motion->position, motion->rotation);
+  const stewart_motion * motion, const measured_leg * leg, double * effort, double wrench[6]) {
+  lever_slope lever = leg->lever;
   double too_near = stops->least_lever[i] - lever.ratio;
   if (!(too_near > 0.0)) {return;}
   vector arm = rotate(motion->rotation, read3(platform->legs[i].platform_joint));
   vector joint = add(
     read3(motion->linear_velocity), cross(read3(motion->angular_velocity), arm));
-  double lever_rate = lever.of_drive * rate + dot(lever.of_joint, joint);
+  double lever_rate = lever.of_drive * leg->rate + dot(lever.of_joint, joint);
   double push = largest(0.0, stops->stiffness[i] * too_near - stops->damping[i] * lever_rate);
   vector force = scale(push, lever.of_joint);
   *effort += push * lever.of_drive;
@@ -101,7 +101,7 @@ static void move_base(const one_plant * plant, double part, stewart_base * base)
 typedef struct { stewart_motion motion; double efforts[6], torques[6]; } driven_motion;
 
 /* Write a state's time derivative under its loads and a motion of the base. */
-static driven_motion differentiate(
+FLAT static driven_motion differentiate(
   const stewart_platform * platform, const one_plant * plant, const plant_state * state,
   const stewart_base * base, plant_state * slope) {
   driven_motion of;
@@ -127,7 +127,7 @@ static driven_motion differentiate(
     }
     if (plant->stops.least_lever[i] > 0.0) {
       add_lever_stop(
-        platform, &plant->stops, i, &of.motion, leg.rate, &stop[i], load_of_all);
+        platform, &plant->stops, i, &of.motion, &leg, &stop[i], load_of_all);
     }
     of.torques[i] = plant->commands[i];
     of.efforts[i] = of.torques[i] + stop[i];
@@ -150,7 +150,7 @@ static driven_motion differentiate(
 
 /* Write the positions, rates and levers of the legs; return the largest of the angular speed and of
    how fast they change [1/s]; infinite where a leg has no length or does not reach. */
-static double write_legs(
+FLAT static double write_legs(
   const stewart_platform * platform, const plant_state * state, one_plant * plant) {
   stewart_motion motion = {{0.0}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}};
   vector omega = read3(state->twist + 3);
@@ -161,8 +161,7 @@ static double write_legs(
   for (int i = 0; i < 6; i++) {
     measured_leg leg = measured_of(platform, i, &motion);
     plant->positions[i] = leg.position, plant->rates[i] = leg.rate;
-    plant->lever_ratios[i] =
-      lever_slope_of(platform, i, motion.position, motion.rotation).ratio;
+    plant->lever_ratios[i] = leg.lever.ratio;
     fastest = largest(fastest, leg.pace);
   }
   return fastest;

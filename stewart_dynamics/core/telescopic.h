@@ -268,15 +268,9 @@ static measured_leg telescopic_measured(const stewart_leg * leg, const stewart_m
   leg_line at = telescopic_line(leg, motion->position, motion->rotation);
   vector turning = cross(read3(motion->angular_velocity), at.arm);
   vector joint = add(read3(motion->linear_velocity), turning);
-  measured_leg of = {at.length, dot(at.direction, joint), HUGE_VAL};
+  measured_leg of = {
+    at.length, dot(at.direction, joint), HUGE_VAL, {1.0, 0.0, {0.0, 0.0, 0.0}}};
   if (0.0 < at.length && at.length < HUGE_VAL) {of.pace = at.per_length * norm(joint);}
-  return of;
-}
-
-static lever_slope telescopic_slope(
-  const stewart_leg * leg, const double position[3], const double r[9]) {
-  lever_slope of = {1.0, 0.0, {0.0, 0.0, 0.0}};
-  (void)leg, (void)position, (void)r;
   return of;
 }
 

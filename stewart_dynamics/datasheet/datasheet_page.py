@@ -26,6 +26,7 @@ from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
 from stewart_dynamics.datasheet.rated_workspace import (
     Boundary, Frequencies, PLANES, rotations_over_height)
 from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.limits import LIMITS
 from stewart_dynamics.parameters.table import inertia_matrix, PARAMETERS
 from stewart_dynamics.reporting.pages import digits, link_to_other, number, page
 from stewart_dynamics.reporting.results_folder import REPLAYS, REPORT_PAGE
@@ -112,7 +113,7 @@ class Pictures(NamedTuple):
 def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pictures: Pictures,
                torque_unit: str) -> None:
     """Write datasheet.html, with the content of datasheet.json; torque_unit: one of TORQUES."""
-    drawing = pictures.drawing()
+    drawing, kind = pictures.drawing(), hexapod.given.leg_kind
     bag = Path(sheet['motion']['bag']) if sheet['motion'] else Path()
     name = (bag if bag.is_dir() else bag.with_suffix('')).name
     text = page(
@@ -122,7 +123,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         drive_heads=_drive_heads(sheet, hexapod, torque_unit),
         joints=_joints(sheet, hexapod, torque_unit),
         properties=_properties(sheet, hexapod, torque_unit), drive_unit=_drive_unit(hexapod),
-        position=hexapod.given.leg_kind.position.name,
+        position=kind.position.name, kind=kind,
+        rate_phrase=LIMITS[kind.rate_limit].phrase, effort_phrase=LIMITS[kind.effort_limit].phrase,
         verdicts=[(name.capitalize(), found, words(found)) for name, words in (
             ('motion', motion_verdict), ('box', box_verdict)) if (found := sheet[name])],
         report=link_to_other(path, [

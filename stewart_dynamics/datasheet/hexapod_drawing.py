@@ -30,6 +30,7 @@ _TRIAD = 22.0  # length of an axis [px]
 _VERTICAL = 0.9999  # cosine of the largest angle of an axis that counts as vertical
 # Width of a digit and height of a line in a picture [px].
 _DIGIT, _LINE = 6.6, 11.0
+_ARROW = 0.8  # length of an arrow by the path of an anchor for a unit of its drive
 # Axes that are shorter in a view, as parts of their length, are not drawn.
 _SEEN = 0.72
 
@@ -84,9 +85,13 @@ class Drawing:
         self._base = np.asarray(parameters.geometry.base_joints) @ self._upright.T
         self._platform = self._placed(pose, self._arms)
         lines = parameters.leg_kind.lines(parameters, pose.position, pose.rotation)
-        # the begin of each line of force, where drives move it
-        self._anchors = None if lines.path is None else (
-            self._platform - lines.lengths[:, None] * lines.directions @ self._upright.T)
+        # the begin of each line of force, where drives move it, and its path by a unit of theirs
+        self._anchors: Array | None = None
+        self._tangents: Array | None = None
+        if lines.path is not None:
+            self._anchors = self._platform - (
+                lines.lengths[:, None] * lines.directions @ self._upright.T)
+            self._tangents = lines.path.tangents @ self._upright.T
         self._pivot: Array = np.empty((0, 3))
         if pivot is not None and np.any(pivot):
             self._pivot = self._placed(pose, pivot[None])
@@ -138,11 +143,33 @@ class Drawing:
         return picture
 
     def oblique(self) -> Picture:
-        """Return an oblique view without dimensions."""
-        picture = Picture(300.0, 240.0, 'The hexapod')
-        self._draw(picture, OBLIQUE, self._fitted(
-            OBLIQUE, picture, (OBLIQUE,), Margins(6.0, 6.0, 12.0, 6.0)))
+        """Return an oblique view without dimensions; with signs where drives move anchors."""
+        picture, moving = Picture(300.0, 240.0, 'The hexapod'), self._anchors is not None
+        place = self._fitted(OBLIQUE, picture, (OBLIQUE,), Margins(
+            6.0, 26.0, 52.0, 26.0) if moving else Margins(6.0, 6.0, 12.0, 6.0))
+        self._draw(picture, OBLIQUE, place)
+        if self._anchors is not None and self._tangents is not None:
+            self._signs(picture, place, self._anchors, self._tangents)
         return picture
+
+    def _signs(self, picture: Picture, place: _Place, anchors: Array, tangents: Array) -> None:
+        """Draw arrows along which anchors move with positive rates, and numbers of the legs."""
+        begins, joints = place(OBLIQUE.of(anchors)), place(OBLIQUE.of(self._base))
+        ends = place(OBLIQUE.of(anchors + _ARROW * tangents))
+        for n, (begin, end, joint) in enumerate(zip(begins, ends, joints, strict=True)):
+            along = end - begin
+            length = max(float(np.linalg.norm(along)), 1e-9)
+            along = along / length
+            across = np.array([-along[1], along[0]])
+            picture.line(begin, end, css=f'turn leg{n}')
+            picture.path([end + 4.0 * along, end - 3.0 * along + 3.0 * across,
+                          end - 3.0 * along - 3.0 * across], closed=True, css=f'turn tip leg{n}')
+            away = joint - begin
+            away = away / max(float(np.linalg.norm(away)), 1e-9)
+            picture.text(joint + 11.0 * away + [0.0, 4.0], str(n + 1), 'middle',
+                         css=f'number halo leg{n}')
+        name = self._p.leg_kind.position.field
+        picture.text([150.0, 234.0], f'arrows: positive {name}', 'middle', css='tick')
 
     def _placed(self, pose: Pose, arms: Array) -> Array:
         """Return where points (N, 3) of the platform frame are, upright [m]."""

@@ -64,8 +64,7 @@ def picture(hexapod: Hexapod, name: str) -> str:
           f'{_number(y)}, {_number(z)} m, turned by {angles} degrees.')
     words = 'Discs are base joints, rings platform joints.'
     if knees:
-        words += (' Arrows: motion at a growing angle; dot in a ring: toward you, cross: away '
-                  'from you.')
+        words += ' Arrows: motion at a growing angle (dot: toward you, cross: away).'
     _text(root, 20.0, _VIEW + 44.0, words)
     _table(root, hexapod)
     return text_of(root, 'Numbers are legs in the order of all arrays of six.')

@@ -41,7 +41,7 @@ def hal_lines(parameters: Parameters) -> str:
     Raises ParameterError: screws turn with their legs, and their leads differ; or at home the
         platform is turned so far about z that genhexkins finds no pose.
     """
-    require_kind(parameters, '--linuxcnc')
+    require_kind(parameters, '--linuxcnc: genhexkins has lengths of legs')
     return '\n'.join([*_head(parameters), *_pins(parameters), ''])
 
 

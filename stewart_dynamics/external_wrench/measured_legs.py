@@ -128,7 +128,7 @@ class EffortsOfMotors:
             before, self._before = self._before, measurement
             rates: Array = np.array([measurement.rates])
             accelerations: Array = np.zeros((1, 6))
-            # What turns the rotor passes no gear.
+            # Torque that accelerates the rotor passes no gear.
             if before and 0 < (passed := measurement.stamp - before.stamp) <= self._longest_gap:
                 accelerations = (rates - before.rates) / (passed * NANOSECOND)
             efforts = without_losses(efforts[None], rates, accelerations, self._parameters)[0]

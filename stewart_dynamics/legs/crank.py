@@ -49,7 +49,7 @@ class Crank(LegKind):
     effort = Named('torque', 'torques', 'N m', '+ drives the angle up', 'drives it down')
     effort_signs = 'drives the angle up', 'drives it down'
     extremes = 'smallest angle', 'largest angle'
-    decimals = 4
+    decimals = -1
     position_limits = 'limits.angle_min', 'limits.angle_max'
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
     lever_limit, ends_differ = 'limits.lever_min', True
@@ -58,7 +58,7 @@ class Crank(LegKind):
     simulated = 'leg_torque'
     resolved = ('a crank turns by more than that, a joint moves by more than that part of its '
                 'rod, or a lever changes by more than that part of itself, as at a dead centre')
-    gear, right_sign = 'gear', '+ must drive the angle up'
+    gear, transmission, right_sign = 'gear', 'the gear', '+ must drive the angle up'
     wrong_units = (
         (1e-3, 'kN m in place of N m'), (1.0 / STANDARD_G, 'kgf m in place of N m'),
         (1e2 / STANDARD_G, 'kgf cm in place of N m'), (1.0 / 1.355818, 'lbf ft in place of N m'),

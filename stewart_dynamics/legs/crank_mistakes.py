@@ -87,6 +87,7 @@ def likely_mistakes(p: Parameters, home: AtHome, angles: Array, levers: Array,
     signs = tuple(_signs_and_zeros(p, home, angles, np.sign(levers)))
     yield from signs
     yield from _bodies(p, *bodies)
+    yield from _servos(p)
     ratios, least = np.abs(levers) / sizes, p['limits.lever_min']
     at = int(np.argmin(ratios - least))
     if ratios[at] < least[at]:
@@ -95,6 +96,24 @@ def likely_mistakes(p: Parameters, home: AtHome, angles: Array, levers: Array,
                'radius in another unit?')
     elif not signs and home.efforts is not None:
         yield from _loads_at_home(p, np.abs(home.efforts), np.abs(levers))
+
+
+def _servos(p: Parameters) -> Iterator[str]:
+    """Yield limits of angles that a servo does not reach: travels would be stated beyond it."""
+    points = p['servo.angle_at_min'], p['servo.angle_at_max']
+    if points[0] is None:
+        return
+    low, high = np.minimum(*points), np.maximum(*points)
+    limits = p.limits.angle_min, p.limits.angle_max
+    least, most = (np.full(6, turn) if limit is None else limit for limit, turn in zip(
+        limits, (-_LARGEST_ANGLE, _LARGEST_ANGLE), strict=True))
+    beyond = np.maximum(low - least, most - high)
+    leg = int(np.argmax(beyond))
+    if beyond[leg] > _EQUAL:
+        ends = ['not set' if limit is None else f'{limit[leg]:.4g} rad' for limit in limits]
+        yield (f'limits.angle_min, limits.angle_max: {p.joints[leg]}: {ends[0]}, '
+               f'{ends[1]}, but its servo turns from {low[leg]:.4g} to {high[leg]:.4g} '
+               'rad between its two points: narrow the limits, from which travel is computed')
 
 
 def above_motors(p: Parameters, home: AtHome) -> Array:

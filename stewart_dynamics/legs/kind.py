@@ -109,7 +109,8 @@ class LegKind(ABC):
     extremes : tuple of str
         Names of the smallest and of the largest position.
     decimals : int
-        Decimals of efforts and powers in tables: torques of small servos are a few mN m.
+        Decimals of efforts and powers in tables; -1: four digits of the largest, as torques are
+        hundreds of N m or, of small servos, a few mN m.
     position_limits : tuple of str
         Limits of the drive's position, the smallest and the largest.
     rate_limit, effort_limit : str
@@ -125,7 +126,7 @@ class LegKind(ABC):
     simulated : str
         Value of the simulator's parameter ``commands`` for these efforts.
     resolved : str
-        What a step of the simulator may not do, besides turning the platform by a number.
+        Motions for which a step of the simulator is too long, besides a turn of the platform.
     exact : bool
         Whether results are sums, products, quotients and square roots, which have the same bits on
         all processors; sin, cos and atan2 depend on the mathematical library.
@@ -135,8 +136,8 @@ class LegKind(ABC):
         Efforts in another unit, by those in the right one, and in words.
     right_sign : str
         Effect that a positive effort must have.
-    gear : str
-        Parts between motor and drive.
+    gear, transmission : str
+        The part between motor and drive, and all of them.
     ratio : str
         The parameter without which there are no motors; empty: not needed.
     own : tuple of str
@@ -187,6 +188,7 @@ class LegKind(ABC):
     width: int = _RESULT['joint_forces'].stop
     right_sign: str
     gear: str
+    transmission: str
     ratio: str = ''
     wrong_units: tuple[tuple[float, str], ...]
     own: tuple[str, ...]
@@ -205,7 +207,7 @@ class LegKind(ABC):
     zero: str = ''
     likely: Mapping[str, Any] = {}
     inertia_unit: str  # of the reflected inertia of a drive
-    reflected: str  # what it is, in a formula
+    reflected: str  # its formula
     rotors: str  # and of which parts
     friction_units: tuple[str, str]  # viscous and Coulomb
     bodies: Mapping[str, str]  # of a leg, and the parameters of their masses
@@ -253,7 +255,7 @@ class LegKind(ABC):
     @abstractmethod
     def relative_changes(self, parameters: Parameters) -> Sequence[Array]:
         """
-        Return how ``mass_values`` (n, 6) change with what may be uncertain of a leg's parts.
+        Return how ``mass_values`` (n, 6) change with uncertain properties of a leg's parts.
 
         Each for a relative change of a mass, a center of mass, or an inertia.
         """
@@ -389,7 +391,7 @@ class LegKind(ABC):
 
     @abstractmethod
     def places(self, steps: Sequence[LegJoint]) -> list[str]:
-        """Return where each of these joints is, in words; the drive has none."""
+        """Return where each of these joints is, in words; empty for the drive."""
 
     @abstractmethod
     def parting(self, steps: Sequence[LegJoint]) -> int:

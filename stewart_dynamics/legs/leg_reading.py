@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What reading a leg from a file of another tool has in common for all kinds."""
+"""Functions to read legs of any kind from files of other tools."""
 
 from __future__ import annotations
 

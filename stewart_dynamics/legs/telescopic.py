@@ -39,6 +39,7 @@ class Telescopic(LegKind):
     simulated = 'force'
     resolved = 'a joint moves by more than that part of its leg'
     ratio, gear, right_sign = 'actuator.screw_lead', 'screw', '+ must push'
+    transmission = 'screw and gear'
     wrong_units = ((1e-3, 'kN in place of N'), (1.0 / STANDARD_G, 'kgf in place of N'),
                    (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
     own = ('legs.cylinder.', 'legs.piston.', 'actuator.reflected_mass', 'actuator.screw_lead',

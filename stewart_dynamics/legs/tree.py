@@ -22,7 +22,7 @@ class VisualShape(NamedTuple):
     """A cylinder along z, a ball, or a mesh; placed in the axes of its body."""
 
     kind: str  # cylinder, sphere or mesh
-    color: str  # what it is a part of: base, platform, joint, or a part of a leg
+    color: str  # of its body: base, platform, joint, or a part of a leg
     position: Array  # of its center, or of the mesh's origin (3,) [m]
     rotation: Array  # its axes to those of the body (3, 3)
     radius: float = 0.0

@@ -137,7 +137,9 @@ def find_unreachable(hexapod: Records, joints: Sequence[str], rows: Array, resul
 def unreached(joints: Sequence[str], distances: Array) -> str:
     """Return which leg misses its platform joint most, by distances (6,) [m]."""
     leg = int(np.argmax(distances))
-    return f'{joints[leg]} cannot reach: {1e3 * float(distances[leg]):.3g} mm missing'
+    missing = float(distances[leg])
+    shown = f'{1e3 * missing:.3g} mm' if missing < 1.0 - 1e-3 else f'{missing:.3g} m'
+    return f'{joints[leg]} cannot reach: {shown} missing'
 
 
 def in_parts(compute: Callable[..., object], constants: tuple[Any, ...], *arrays: NDArray[Any],

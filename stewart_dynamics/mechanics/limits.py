@@ -126,7 +126,7 @@ LIMITS: Mapping[str, Limit] = {each.name: each for each in (
 
 
 class LimitNames(NamedTuple):
-    """The limits of a kind of legs, by what their quantities depend on."""
+    """The limits of a kind of legs, grouped by the cause of their quantities: pose, rate, load."""
 
     legs: tuple[str, ...]  # without those of motors
     poses: tuple[str, ...]
@@ -162,7 +162,7 @@ def limits_of_kind(kind: LegKind) -> LimitNames:
     return _BY_KIND[kind.name]
 
 
-# Of programs that know telescopic legs alone.
+# For programs that know telescopic legs alone.
 OF_LEGS, OF_POSES, OF_RESULTS, _, OF_RATES, OF_LOADS, USUAL = _BY_KIND['telescopic']
 OF_MOTORS = tuple(name for name, each in LIMITS.items() if each.depends == MOTOR)
 TORQUE_CONTINUOUS = 'drive.torque_continuous'

@@ -401,7 +401,7 @@ class StewartPlatform:
         """
         Return the twist [v; w] (..., 6) of leg rates (..., 6) [m/s] at a pose, base axes.
 
-        Of cranks the rates are speeds [rad/s].
+        With cranks the rates are speeds [rad/s].
 
         Raises
         ------

@@ -27,6 +27,7 @@ from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.legs import KINDS
 from stewart_dynamics.legs.kind import LegKind
+from stewart_dynamics.mechanics.drives.servos import with_servos
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.node.tasks import LENGTH
 from stewart_dynamics.parameters.table import Parameters
@@ -38,7 +39,7 @@ from stewart_dynamics.setpoints.input_messages import (
     SOURCES, TWIST, WRENCH)
 from stewart_dynamics.setpoints.output_messages import (
     DETERMINANT, LEG_STATES, LegTopics, MOTOR_STATES, MOTOR_TORQUES, MOTOR_TYPES, output_types,
-    WARNING)
+    SERVO_PULSES, SERVO_TYPES, WARNING)
 from stewart_dynamics.setpoints.sample_joining import WAITING
 
 DIAGNOSTICS, MARKERS, PAYLOAD, TRAVEL = '/diagnostics', 'markers', 'payload', 'travel'
@@ -90,7 +91,7 @@ SUBSCRIBED = (
 
 def _output(name: str, meaning: str, parameter: str = '', latched: bool = False,
             kind: LegKind = KINDS[0]) -> Topic:
-    return Topic(name, (output_types(kind) | MOTOR_TYPES)[name], meaning, parameter,
+    return Topic(name, (output_types(kind) | MOTOR_TYPES | SERVO_TYPES)[name], meaning, parameter,
                  latched=latched, depth=1 if latched else 10)
 
 
@@ -119,6 +120,9 @@ PUBLISHED = (
             '[motors](drives.md), named as the joints with `_motor` after it', 'drive.*'),
     _output(MOTOR_TORQUES, 'six torques, N m; remap it to the `commands` of an effort controller '
             'of the motors', 'drive.*'),
+    _output(SERVO_PULSES, 'pulse widths of six [hobby servos](real_time.md#hobby-servos), s, '
+            'never outside `servo.pulse_min` and `servo.pulse_max`; not published without '
+            'torques, and where an angle is outside the two points of its servo', 'servo.*'),
     Topic(planned.OUTPUT, planned.OUTPUT_TYPE,
           'answer to `~/platform_trajectory`, with its stamp and times: positions, velocities '
           'and effort of the legs; nothing when it is rejected', depth=LENGTH),
@@ -192,6 +196,7 @@ class NodeTopics:
         there = {MARKERS: parameters.visualization_rate > 0.0, TF: parameters.publish_tf}
         there[JOINT_STATES] = there[MARKERS]
         there[MOTOR_STATES] = there[MOTOR_TORQUES] = bool(parameters.drives)
+        there[SERVO_PULSES] = with_servos(parameters)
         there |= {topic: kind is parameters.leg_kind
                   for kind in KINDS for topic in LegTopics.of(kind)}
         for topic in PUBLISHED:

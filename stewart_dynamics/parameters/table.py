@@ -404,10 +404,10 @@ class LimitsGroup(ParameterGroup):
         'maximum angle between a leg and its geometry.platform_joint_axes', 'rad',
         'platform joint angle', 'joint angle at the platform', maximum=math.pi)
     angle_min: Array | None = _limit(
-        'smallest angle of a crank', 'rad', 'angle', 'smallest angle of a crank',
+        'smallest angle of a crank', 'rad', 'angle', 'smallest angle',
         minimum=-math.inf, above=False, **_ANGLES)
     angle_max: Array | None = _limit(
-        'largest angle of a crank', 'rad', 'angle', 'largest angle of a crank',
+        'largest angle of a crank', 'rad', 'angle', 'largest angle',
         minimum=-math.inf, above=False, **_ANGLES)
     speed_max: Array | None = _limit(
         'maximum speed of a crank', 'rad/s', 'speed', 'speed of a crank', title='Crank speeds',
@@ -422,7 +422,7 @@ class LimitsGroup(ParameterGroup):
     lever_min: Array | None = _limit(
         'smallest magnitude of the lever of a crank, by the length of the crank: 0 at a dead '
         'centre, 1 at the best; 0.1 by default', '', 'lever', 'lever of a crank', above=False,
-        maximum=1.0)
+        maximum=1.0, title='Crank levers', note='by their largest values: 0 at a dead centre')
     leg_clearance_min: float | None = declare(
         'minimum distance of the surface of a leg, a cylinder and a thinner piston, from that of '
         'another leg, and from the outlines of geometry that are given; unlimited if not set',

@@ -23,6 +23,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, RPM, SECOND
 from stewart_dynamics.colors import FORCE_COLORS
 from stewart_dynamics.estimation.confidence_level import PERCENT
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.frames.rotation import to_euler
@@ -39,7 +40,7 @@ from stewart_dynamics.replay.summary import (
     Answered, key_of, kind_in, LegKeys, margin_key, unit_key)
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
-    base64_of, link, link_to_other, page, plotly_script)
+    base64_of, decimals_of, link, link_to_other, page, plotly_script)
 from stewart_dynamics.reporting.plots import (
     base_wrench_plots, measured_plots, motion_plots, plotted, spectrum_plots)
 from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, DATASHEETS
@@ -160,9 +161,12 @@ class Report:
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
             date=date(summary['setpoints']['first_stamp_ns']),
             quantities={name: limit.quantity for name, limit in LIMITS.items()},
-            units={name: each.unit or '' for name, each in PARAMETERS.items()},
+            units={name: self._parameters.unit_of(name) or '' for name in PARAMETERS},
             most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS_OF_WRENCH,
-            kind=self._kind, effort_decimals=self._kind.decimals,
+            kind=self._kind, **_decimals(self._kind, summary['legs']),
+            wrench_decimals={part: decimals_of(self._kind.decimals, [
+                summary['base_wrench'][part][f'peak_{unit_key(unit)}']])
+                for part, unit in PARTS_OF_WRENCH.items()},
             keys=LegKeys.of(self._kind), key_of=key_of, unit_key=unit_key,
             percent=PERCENT, bandwidth=bandwidth, **_response_charts(followed),
             charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
@@ -219,6 +223,14 @@ class Report:
             'curves': [_packed(*each) for each in curves],
             'plots': [plot.plain() for plot in plots],
         }
+
+
+def _decimals(kind: LegKind, legs: Mapping[str, Mapping[str, float | None]]) -> dict[str, int]:
+    """Return the decimals of efforts, powers and energies in the tables."""
+    keys = {'effort': LegKeys.of(kind).effort_peak, 'power': 'power_peak_w',
+            'energy': 'energy_driving_j'}
+    return {f'{name}_decimals': decimals_of(kind.decimals, [leg[key] for leg in legs.values()])
+            for name, key in keys.items()}
 
 
 def _response_charts(followed: Followed | None) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from stewart_dynamics.bags.find import bytes_of, RESULT
 from stewart_dynamics.bags.recording import LISTED, listed, Recording
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
+from stewart_dynamics.mechanics.drives.servos import outside_servos, pulse_rows, with_servos
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -174,6 +175,8 @@ class _Run:
         self._comparison = None if options.measured is None else Comparison(
             parameters, self._per_effort is not None)
         self._efforts = Efforts(parameters.joints)
+        self._with_servos = with_servos(parameters)
+        self._outside_servos, self._first_outside = 0, ''  # setpoints, and the first in words
         self._response = RecordedResponse(
             parameters, topics if options.measured_table is None else {
                 MEASURED_POSE: str(options.measured_table)}, self._setpoints.reject,
@@ -233,6 +236,9 @@ class _Run:
                 self._response_missing = f'{exc}'
             for notice in self._response.notices:
                 self._notice(notice)
+        if self._outside_servos:
+            self._notice(f'servo_pulses: none for {self._outside_servos} of the setpoints, '
+                         f'first at {self._first_outside}')
         self._files.close()
 
     def summary(self) -> dict[str, Any]:
@@ -249,7 +255,8 @@ class _Run:
         if self._comparison is not None:
             mistakes += self._comparison.stamps.mistakes(True, [MEASURED])
         unreachable = any(each.reason == OUT_OF_REACH for each in self._setpoints.counts)
-        values['limit_met'] = values['limit_met'] or bool(mistakes) or unreachable
+        values['limit_met'] = (values['limit_met'] or bool(mistakes) or unreachable
+                               or self._outside_servos > 0)
         measured = None if self._comparison is None else self._comparison.values()
         if measured and not measured['setpoints_compared']:
             missing.append(f'nothing could be compared with {self._options.measured}: no '
@@ -326,6 +333,8 @@ class _Run:
                          self._base_wrench(setpoints),
                          powers_of(self._platform, setpoints, outputs))
         self._files.write(block)
+        if self._with_servos:
+            self._note_servos(block)
         if self.report is not None:
             block = block._replace(breakdown=self._breakdown(
                 setpoints.motions, setpoints.wrenches, setpoints.bases))
@@ -336,6 +345,16 @@ class _Run:
         if self._response is not None:
             self._response.add(setpoints)
         return len(setpoints.stamps)
+
+    def _note_servos(self, block: Answered) -> None:
+        """Count setpoints with an angle outside the points of its servo: they have no pulses."""
+        positions = block.outputs.drive_positions
+        outside = np.flatnonzero(np.isnan(pulse_rows(self._parameters, positions)[0][:, 0]))
+        if len(outside) and not self._outside_servos:
+            n = int(outside[0])
+            self._first_outside = (f't = {block.seconds[n]:.3f} s: '
+                                   f'{outside_servos(self._parameters, positions[n])}')
+        self._outside_servos += len(outside)
 
     def _seconds(self, stamps: Stamps) -> Array:
         """Return the time since the first setpoint, never decreasing [s]."""

@@ -120,7 +120,6 @@ def _options(given: argparse.Namespace) -> Options:
 def _run(given: argparse.Namespace, options: Options) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import FLEET_PAGE, folders_of_results
-    from stewart_dynamics.legs import require_kind
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.replay.bag_report import share_plotly
@@ -128,8 +127,6 @@ def _run(given: argparse.Namespace, options: Options) -> int:
 
     interrupt_on_signals()
     parameters = Parameters.from_yaml(given.params, given.node)
-    if options.response:
-        require_kind(parameters, 'responses')
     bags = folders_of_results(given.bags, given.output)
     if options.report and given.plotly == 'shared':
         options = options._replace(plotly=share_plotly(given.output))

@@ -22,7 +22,7 @@ from stewart_dynamics.mechanics.limits import (
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.summary import kind_in, margin_key, unit_key
-from stewart_dynamics.reporting.pages import fixed
+from stewart_dynamics.reporting.pages import decimals_of, fixed
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, OUT_OF_REACH, Rejection
 
 Summary = Mapping[str, Any]  # the content of summary.json
@@ -80,7 +80,7 @@ def motion_statements(summary: Summary) -> list[Statement]:
     points, kind = summary['setpoints'], kind_in(summary['legs'])
     found = [
         *_inputs(summary), *_limits(summary), *_joints(summary['legs']),
-        *_loads(summary['base_wrench']), *_motors(summary),
+        *_loads(summary['base_wrench'], kind), *_motors(summary),
         *_singularity(summary['singularity'], kind)] if points['answered'] else []
     return [*found, *_answered(points, kind.effort.field)]
 
@@ -242,12 +242,13 @@ def _angle(radians: float) -> str:
     return f'{radians:.4g} rad ({math.degrees(radians):.1f} deg)'
 
 
-def _loads(found: Summary) -> Iterator[Statement]:
+def _loads(found: Summary, kind: LegKind) -> Iterator[Statement]:
     for name, unit in PARTS_OF_WRENCH.items():
         each, key = found[name], unit_key(unit)
         if each[f'peak_{key}'] is not None:
-            rms = '-' if each[f'rms_{key}'] is None else fixed(each[f'rms_{key}'], 1)
-            peak = fixed(each[f'peak_{key}'], 1)
+            decimals = decimals_of(kind.decimals, [each[f'peak_{key}']])
+            rms = '-' if each[f'rms_{key}'] is None else fixed(each[f'rms_{key}'], decimals)
+            peak = fixed(each[f'peak_{key}'], decimals)
             yield Statement(LOADS, 'none', f'{name} on the base: {peak} {unit} at most',
                             each['peak_at_s'], f'base_{name}', f' (RMS {rms})')
 

@@ -11,13 +11,13 @@ import re
 import textwrap
 from typing import Any
 
-from stewart_dynamics.legs.kind import LegKind, Named
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.statements import (
     INPUTS, JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING, SINGULARITY)
 from stewart_dynamics.replay.summary import key_of, kind_in, LegKeys
-from stewart_dynamics.reporting.pages import fixed
+from stewart_dynamics.reporting.pages import decimals_of, fixed
 from stewart_dynamics.response.axes_response import AXES
 from stewart_dynamics.response.response_measures import bandwidth, BANDWIDTHS
 from stewart_dynamics.setpoints.rejections import Rejection
@@ -30,7 +30,7 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
     """Return the summary of a bag, from summary.json; likely mistakes are no part of it."""
     lines = [f'{summary["bag"]}:']
     if summary['measured']:
-        lines += _measured_lines(summary['measured'], kind_in(summary['legs']).effort)
+        lines += _measured_lines(summary['measured'], kind_in(summary['legs']))
     if summary['response']:
         lines += _response_lines(summary['response'])
     lines += summary_lines(summary)
@@ -88,14 +88,16 @@ def measured_headline(measured: Mapping[str, Any], kind: LegKind) -> str:
             f'{effort.unit} RMS{share}; most in {leg}, by {worst:.3g} {effort.unit}')
 
 
-def _measured_lines(measured: Mapping[str, Any], effort: Named) -> list[str]:
+def _measured_lines(measured: Mapping[str, Any], kind: LegKind) -> list[str]:
     """Return the result of the comparison with measured efforts, the headline first."""
     lines = [measured['headline']]
     if not measured['setpoints_compared']:
         return lines
-    key = key_of('residual_rms', effort.unit)
-    rms = ', '.join(
-        f'{leg} {fixed(found[key], 1)}' for leg, found in measured['legs'].items())
+    effort = kind.effort
+    residuals = {leg: found[key_of('residual_rms', effort.unit)]
+                 for leg, found in measured['legs'].items()}
+    decimals = decimals_of(kind.decimals, residuals.values())
+    rms = ', '.join(f'{leg} {fixed(each, decimals)}' for leg, each in residuals.items())
     lines += [f'compared {measured["setpoints_compared"]} setpoints; measured minus computed '
               f'{effort.name}, RMS [{effort.unit}]: {rms}',
               'stewart_identify finds the payload and friction that fit the measured '
@@ -131,21 +133,25 @@ def _span(begin: float, end: float) -> str:
 _NAME = 11
 
 
-def _columns(kind: LegKind) -> list[tuple[str, str, str, int, int]]:
+def _columns(kind: LegKind, legs: Mapping[str, Mapping[str, float | None]],
+             ) -> list[tuple[str, str, str, int, int]]:
     """
     Return the columns of the table of legs: group, title, key, width, decimals.
 
     With the leg's name and the mark, they have the width _WIDTH.
     """
     keys = LegKeys.of(kind)
+    of_efforts, of_powers = (
+        decimals_of(kind.decimals, [leg[key] for leg in legs.values()])
+        for key in (keys.effort_peak, 'power_peak_w'))
     effort, position, rate = (f'{each.name} [{each.unit}]' for each in (
         kind.effort, kind.position, kind.rate))
     return [
-        (effort, 'peak', keys.effort_peak, 10, kind.decimals),
+        (effort, 'peak', keys.effort_peak, 10, of_efforts),
         (effort, 'at [s]', keys.effort_at, 9, 2),
-        (effort, 'RMS', keys.effort_rms, 9, kind.decimals),
-        (effort, 'margin', keys.effort_margin, 9, kind.decimals),
-        ('power [W]', 'peak', 'power_peak_w', 10, kind.decimals),
+        (effort, 'RMS', keys.effort_rms, 9, of_efforts),
+        (effort, 'margin', keys.effort_margin, 9, of_efforts),
+        ('power [W]', 'peak', 'power_peak_w', 10, of_powers),
         (position, 'from', keys.position_min, 8, 4), (position, 'to', keys.position_max, 8, 4),
         (position, 'margin', keys.position_margin, 8, 4),
         (rate, 'peak', keys.rate_peak, 9, 4), (rate, 'margin', keys.rate_margin, 8, 4)]
@@ -155,7 +161,7 @@ def _legs_table(legs: Mapping[str, Mapping[str, float | None]],
                 marked: Sequence[bool], kind: LegKind) -> list[str]:
     """Return the table of the legs; columns without numbers are left out."""
     marked_key = LegKeys.of(kind).effort_peak
-    columns = [column for column in _columns(kind)
+    columns = [column for column in _columns(kind, legs)
                if any(leg[column[2]] is not None for leg in legs.values())]
     spans: dict[str, int] = {}
     titles = f'{"leg":<{_NAME}}'

@@ -68,6 +68,11 @@ def decimals(values: Iterable[float | None]) -> int:
     return max(0, min(3 - math.floor(math.log10(largest)), 9)) if largest else 1
 
 
+def decimals_of(kind: int, values: Iterable[float | None]) -> int:
+    """Return ``LegKind.decimals`` for values: those of their largest where it leaves it open."""
+    return kind if kind >= 0 else decimals(values)
+
+
 def thousands(count: int) -> str:
     """Return a count with spaces between thousands."""
     return typeset(f'{count:,}')

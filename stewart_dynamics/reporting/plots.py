@@ -149,7 +149,7 @@ def _bounded(p: Parameters, limits: Sequence[str], title: str, channels: slice, 
              both: bool = False, spikes: bool = False) -> Plot:
     """Return the plot of a quantity with limits, the lower one first; both: of either sign."""
     quantity = LIMITS[limits[0]].quantity
-    return Plot(quantity.key, title, quantity.unit, _of_legs(p.joints, channels), note,
+    return Plot(quantity.key, title, quantity.unit or '–', _of_legs(p.joints, channels), note,
                 [bound for limit in limits for bound in _bounds(limit, p[limit], both)],
                 spikes=spikes)
 

@@ -19,7 +19,6 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers, Records, Stamps
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_rotation_vector
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
@@ -39,7 +38,7 @@ from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejections
 from stewart_dynamics.setpoints.step import Batch
 
 MEASURED, MEASURED_POSE = 'measured', 'measured_pose'
-NO_POSE = 'no pose has these lengths'
+NO_POSE = 'no pose has these'  # positions of the drives
 
 
 class Followed(NamedTuple):
@@ -62,7 +61,6 @@ class RecordedResponse:
     def __init__(self, parameters: Parameters, topics: Mapping[str, str],
                  reject: Callable[[str, str, str, int], None]) -> None:
         signal_module()
-        require_kind(parameters, 'responses')
         self._parameters, self._reject = parameters, reject
         self._platform = StewartPlatform(parameters)
         self.key = MEASURED_POSE if MEASURED_POSE in topics else MEASURED
@@ -158,15 +156,16 @@ class RecordedResponse:
         if self.key == MEASURED:
             measured = measured._replace(
                 values=measured.values + self._parameters.geometry.zero_length)
-            lengths = commanded._replace(values=self._platform.inverse_kinematics(
+            positions = commanded._replace(values=self._platform.inverse_kinematics(
                 Pose(commanded.values[:, POSITION],
                      commanded.values[:, ROTATION].reshape(-1, 3, 3))))
-            own = at_even_times(lengths, measured, timeout)
+            own = at_even_times(positions, measured, timeout)
             if own.runs:
                 legs = legs_response(own, self._parameters.joints)
             measured, lost = achieved_poses(self._platform.structure, measured, commanded)
             if lost:
-                self._reject(self.key, NO_POSE, '', lost)
+                named = self._parameters.leg_kind.position.field
+                self._reject(self.key, f'{NO_POSE} {named}', '', lost)
             check_overlap(commanded, measured, self._topic)
         axes_commanded, axes_achieved = (
             each._replace(values=axes_of(each.values, mean_orientation(each.values)))
@@ -205,20 +204,21 @@ def mean_orientation(poses: Array) -> Array:
     return found
 
 
-def achieved_poses(structure: Records, lengths: Track, commanded: Track) -> tuple[Track, int]:
+def achieved_poses(structure: Records, measured: Track, commanded: Track) -> tuple[Track, int]:
     """
-    Return the poses (N, 12) of measured lengths by forward kinematics, begun at commanded poses.
+    Return the poses (N, 12) of measured drives by forward kinematics, begun at commanded poses.
 
-    The number of lengths without a pose, which are left out, is returned too.
+    The number of samples without a pose, which are left out, is returned too.
 
-    structure: of the hexapod. lengths: (N, 6) [m]. commanded: rows of poses (M, 12).
+    structure: of the hexapod. measured: positions of the drives (N, 6), as lengths [m]. commanded:
+        rows of poses (M, 12).
     """
-    rows = np.zeros((len(lengths.stamps), MOTION))
-    nearest = np.searchsorted(commanded.stamps, lengths.stamps).clip(0, len(commanded.stamps) - 1)
+    rows = np.zeros((len(measured.stamps), MOTION))
+    nearest = np.searchsorted(commanded.stamps, measured.stamps).clip(0, len(commanded.stamps) - 1)
     rows[:, POSE] = commanded.values[nearest]
     codes: Integers = np.empty(len(rows), dtype=np.int64)
-    forward_kinematics.poses(structure, np.ascontiguousarray(lengths.values), rows, codes,
+    forward_kinematics.poses(structure, np.ascontiguousarray(measured.values), rows, codes,
                              np.empty_like(codes), np.empty(len(rows)))
     found = codes == forward_kinematics.FOUND
-    return (Track(lengths.stamps[found], rows[found, POSE], lengths.late),
+    return (Track(measured.stamps[found], rows[found, POSE], measured.late),
             int(np.count_nonzero(~found)))

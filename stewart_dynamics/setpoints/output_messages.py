@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics import rows
+from stewart_dynamics.mechanics.drives.servos import pulse_rows, with_servos
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.layout import SideBySide, Written
@@ -28,6 +29,7 @@ from stewart_dynamics.setpoints.step import (
 LEG_STATES, DETERMINANT, WARNING = (
     'leg_states', 'jacobian_determinant', 'singularity_warning')
 MOTOR_STATES, MOTOR_TORQUES = 'motor_states', 'motor_torques'
+SERVO_PULSES = 'servo_pulses'
 
 
 class LegTopics(NamedTuple):
@@ -63,6 +65,8 @@ MOTOR_TYPES = {
     MOTOR_STATES: type_names.JOINT_STATE,
     MOTOR_TORQUES: type_names.FLOAT64_MULTI_ARRAY,
 }
+# With servo.*.
+SERVO_TYPES = {SERVO_PULSES: type_names.FLOAT64_MULTI_ARRAY}
 
 
 class OutputMessages:
@@ -95,6 +99,10 @@ class OutputMessages:
                         positive=FINITE_MOTORS)]
             self.types |= MOTOR_TYPES
         self._of_outputs = SideBySide(kinds, OUTPUT)
+        self._pulses: _ServoPulses | None = None
+        if with_servos(parameters):
+            self._pulses = _ServoPulses(parameters)
+            self.types |= SERVO_TYPES
         self._wrench = StampedWriter(parameters.base_frame, 6)
 
     def of(self, outputs: Outputs) -> list[tuple[str, Flags, NDArray[np.void]]]:
@@ -103,7 +111,8 @@ class OutputMessages:
 
         Returns topics, which outputs have a message (N,), and the messages (N,), of one length.
         """
-        return self._of_outputs.write(outputs.stamps, outputs.rows)
+        messages = self._of_outputs.write(outputs.stamps, outputs.rows)
+        return messages if self._pulses is None else messages + self._pulses.of(outputs)
 
     def of_wrench(self, stamp: int, wrench: Sequence[float]) -> bytes:
         """Return the geometry_msgs/WrenchStamped of a wrench in base axes."""
@@ -114,6 +123,26 @@ class OutputMessages:
         """Return messages for stamps (N,) [ns] and wrenches (N, 6); none for rows of nan."""
         messages = self._wrench.layout.write(stamps, base_wrenches)
         return BASE_WRENCH, ~np.isnan(base_wrenches[:, 0]), messages
+
+
+class _ServoPulses:
+    """
+    Writes the pulse widths of servos, for outputs whose efforts are published.
+
+    A pulse is a command, suppressed together with the efforts. Outputs with an angle outside the
+    points of its servo have no message.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._writer = SideBySide(
+            [Written(SERVO_PULSES, FLOAT64_ARRAY, [slice(0, 6)], known=0)], 6)
+
+    def of(self, outputs: Outputs) -> list[tuple[str, Flags, NDArray[np.void]]]:
+        """Return the messages, as those of OutputMessages."""
+        pulses, _ = pulse_rows(self._parameters, outputs.drive_positions)
+        pulses[~outputs.with_efforts] = np.nan
+        return self._writer.write(outputs.stamps, pulses)
 
 
 def motor_states_writer(parameters: Parameters) -> JointStateWriter | None:

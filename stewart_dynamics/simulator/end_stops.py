@@ -18,8 +18,8 @@ links of a joint meet: a spring with the potential
 and a damper. r changes as an angle does. Its slope (``lever_slope`` in ``core/legs.c``) is a part
 of the drive's rate and a part of the joint's velocity, neither of them divided by k: at the drive
 it is an effort of ordinary size, with the frequency of the stops of positions, and no energy comes
-from it. It takes up 1/2 K r_min^2 and what the damper takes; K is that of the stops of positions,
-sized for the platform at the largest lever. What it cannot hold is refused: a step in which a
+from it. It takes up 1/2 K r_min^2 and the work of the damper; K is that of the stops of positions,
+sized for the platform at the largest lever. A motion that it cannot hold ends: a step in which a
 lever changes by more than half of itself is not taken (``Plant.fault``), so that no motion passes
 a dead centre.
 """

@@ -50,8 +50,9 @@ class InverseDynamics:
         reflected mass and friction of the actuators. A thrust rating of a cylinder bounds these;
         the drive gives ``forces``.
     angles, speeds : (..., 6)
-        Of cranks [rad], [rad/s]; without cranks (..., 0), as the next two. ``lengths`` are those
-        of the rods then, ``rates`` zero, ``forces`` those of the rods at the platform.
+        Angles and speeds of cranks [rad], [rad/s]; without cranks (..., 0), as the next two.
+        With cranks ``lengths`` and ``forces`` are those of the rods, forces at the platform, and
+        ``rates`` are zero.
     torques : (..., 6)
         Torques of the drives at the shafts of the cranks [N m].
     levers : (..., 6)

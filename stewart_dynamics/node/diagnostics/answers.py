@@ -18,6 +18,7 @@ import math
 from statistics import median
 
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND
+from stewart_dynamics.mechanics.drives.servos import outside_servos, with_servos
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
     Exceedance, JUMP, LEVER_MIN, LIMITS, limits_of, TORQUE_MAX, TORQUE_SPEED)
@@ -32,7 +33,8 @@ from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 from stewart_dynamics.setpoints.step import Batch, LEVER_TIMES, Outputs, WARNING_STATE
 
 _CROSSING, _NEARNESS = 'crossing', 'nearness'  # causes of the level of singularity
-_DEAD_CENTRE = 'dead centre'  # a cause of the level of limits: it is predicted
+# Causes of the level of limits: it is predicted; an angle without a pulse.
+_DEAD_CENTRE, _SERVOS = 'dead centre', 'servos'
 
 
 @dataclass
@@ -234,7 +236,7 @@ class LimitsDiagnostics(StatusPart):
     name = 'limits'
 
     def __init__(self, answers: Answers) -> None:
-        super().__init__(*LIMITS, _DEAD_CENTRE)
+        super().__init__(*LIMITS, _DEAD_CENTRE, _SERVOS)
         self._answers = answers
         self._joints = answers.parameters.joints
         self._kind = kind = answers.parameters.leg_kind
@@ -243,6 +245,8 @@ class LimitsDiagnostics(StatusPart):
         self._of_pose = *kind.position_limits, JUMP  # those that a wrong pose exceeds
         self._with_levers = LEVER_MIN in limits.legs
         self._predicted = False  # a dead centre
+        self._with_servos = with_servos(answers.parameters)
+        self._without_pulses = 0  # setpoints with an angle outside the points of its servo
         self._setpoints = Counter[str]()  # that exceed each limit
         self._worst: dict[str, Exceedance] = {}
         self._suppressed = 0
@@ -260,6 +264,8 @@ class LimitsDiagnostics(StatusPart):
             self._largest_effort = efforts[self._its_leg]
         if self._with_levers:
             self._predict(now)
+        if self._with_servos:
+            self._note_servos(now)
         if exceedances or self._exceeding:
             self._exceeding = bool(exceedances)
             self._note_exceedances(setpoint, exceedances, now)
@@ -277,6 +283,15 @@ class LimitsDiagnostics(StatusPart):
         elif self._predicted:
             self.held.see(OK_LEVEL, now, _DEAD_CENTRE)
         self._predicted = time < bound
+
+    def _note_servos(self, now: float) -> None:
+        """Note whether an angle is outside the points of its servo: there are no pulses then."""
+        assert self._answers.outputs is not None
+        outside = outside_servos(
+            self._answers.parameters, self._answers.outputs.drive_positions[0])
+        self._without_pulses += bool(outside)
+        self.held.see(Level(ERROR, f'no servo_pulses: {outside}') if outside else OK_LEVEL,
+                      now, _SERVOS)
 
     def _note_exceedances(
             self, setpoint: Batch, exceedances: Sequence[Exceedance], now: float) -> None:
@@ -334,6 +349,8 @@ class LimitsDiagnostics(StatusPart):
         if self._suppressed:
             values.append((f'setpoints without {self._kind.effort.field}, by limits.action',
                            str(self._suppressed)))
+        if self._without_pulses:
+            values.append(('setpoints outside the points of servos', str(self._without_pulses)))
         return Status(self.name, *self._answers.state(self.held.at(now), 'all held', now), values)
 
     def _of_legs(self, outputs: Outputs) -> list[tuple[str, Array]]:
@@ -355,6 +372,9 @@ class LimitsDiagnostics(StatusPart):
         if self._with_levers:
             level, message = self.held.of(_DEAD_CENTRE, now)
             lines += self._changed(level, message or 'no dead centre predicted', _DEAD_CENTRE)
+        if self._with_servos:
+            level, message = self.held.of(_SERVOS, now)
+            lines += self._changed(level, message or 'servo_pulses again', _SERVOS)
         return lines
 
     def _words(self, worst: Exceedance, others: int = 0) -> str:
