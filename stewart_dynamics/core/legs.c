@@ -55,9 +55,14 @@ typedef struct { double position, rate, pace; } measured_leg;
    of_drive q' + of_joint . x', with the rate of the drive and the velocity of the platform joint. */
 typedef struct { double ratio, of_drive; vector of_joint; } lever_slope;
 
+/* The square of that ratio and its rate: smooth at a dead centre, and negative where a leg does not
+   reach. */
+typedef struct { double value, rate; } lever_square;
+
 /* Of a kind of legs, for the library:
    position: that of the drive, nan where it does not reach. drive_row: the row of J_q, with moments
-   times per_size. measured: in a motion. slope: of the lever. mass, columns: see the structures.
+   times per_size. measured: in a motion. slope, square: of the lever. anchor_rate: of the end of
+   the line that is not at the platform. mass, columns: see the structures.
    momentum_rate: of the leg's momentum, and of its moment of momentum about the base's origin. */
 #define STEWART_LIBRARY
 #include "telescopic.h"
@@ -89,6 +94,20 @@ static lever_slope lever_slope_of(
   const stewart_platform * platform, int i, const double position[3], const double r[9]) {
   switch (platform->leg_kind) {
     default: STEWART_LEG_KINDS(RETURN, slope, (&platform->legs[i], position, r))
+  }
+}
+
+static lever_square lever_square_of(
+  const stewart_platform * platform, int i, const stewart_motion * motion) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, square, (&platform->legs[i], motion))
+  }
+}
+
+static vector anchor_rate_of(
+  const stewart_platform * platform, int i, const stewart_motion * motion) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, anchor_rate, (&platform->legs[i], motion))
   }
 }
 
