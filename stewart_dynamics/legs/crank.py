@@ -280,8 +280,26 @@ class Crank(LegKind):
             inertia, float(np.sum(parameters['legs.rod.mass'])), (least * size, size),
             1.0 + 1.25 * (1.0 + size / rods) ** 2, 5.0 / rods ** 2)
 
-    def bound_intervals(self, parameters: Parameters, motions: Array, results: Array,
-                        path: Array, levers: Array) -> IntervalBounds:
+    def least_levers(self, parameters: Parameters, motions: Array, ends: Array, ways: Array,
+                     ) -> Array:
+        """
+        Return lower bounds of (k / L1)^2, negative where a rod may not reach.
+
+        (k / L1)^2 L2^2 = |l|^2 - (u . l)^2 - g^2 has the gradient 2 w, w = l - (u . l) u - g / L1 l,
+        which changes by at most 1 + (|l| / L1)^2 + |g| / L1 of the way from the nearer end.
+        """
+        size, rod = parameters['legs.crank.length'], parameters['legs.rod.length']
+        here, there = _reserve_at(parameters, motions), _reserve_at(parameters, ends)
+        half = 0.5 * ways
+        farthest = np.maximum(here.distances, there.distances) + half
+        most = np.maximum(np.abs(here.g), np.abs(there.g)) + farthest * half / size
+        steepest = np.maximum(here.slopes, there.slopes) + half * (
+            1.0 + (farthest / size) ** 2 + most / size)
+        least: Array = (0.5 * (here.values + there.values) - 2.0 * steepest * half) / rod ** 2
+        return least
+
+    def bound_intervals(self, parameters: Parameters, results: Array, squares: Array,
+                        reach: Array) -> IntervalBounds:
         """
         Return bounds by the least ratio r = |k| / L1 of a lever in each interval.
 
@@ -292,15 +310,13 @@ class Crank(LegKind):
         inertia, crank_end, coupling, end = (np.abs(each) for each in _of_legs(parameters))
         size, rod = parameters['legs.crank.length'], parameters['legs.rod.length']
         least = np.maximum(_DEEPEST * parameters['limits.lever_min'], _LEAST_LEVER)
-        squares = _least_squares_of_levers(parameters, motions, 0.5 * path[:, None] * levers)
         r = np.sqrt(np.maximum(squares, least ** 2))
-        turning = ((1.0 / rod + (1.0 / size + 1.0 / rod) / r) / r * levers).max(axis=1)
-        bends = turning + ((1.0 + 1.0 / r) / rod * levers).max(axis=1)
+        turning = ((1.0 / rod + (1.0 / size + 1.0 / rod) / r) / r * reach).max(axis=1)
+        bends = turning + ((1.0 + 1.0 / r) / rod * reach).max(axis=1)
         inertia = inertia + parameters['actuator.reflected_inertia']
         gains = 1.0 / (r * size)
         return IntervalBounds(
-            np.sqrt(np.maximum(squares, 0.0)), gains, bends, turning, end + coupling / r, size,
-            inertia * gains + size * coupling,
+            gains, bends, turning, end + coupling / r, size, inertia * gains + size * coupling,
             np.maximum(end + coupling / r, coupling + crank_end / r))
 
     def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
@@ -441,16 +457,16 @@ def _angle_of(parameters: Parameters, position: Array, rotation: Array) -> _Angl
     return _Angle(arms, line, z * cosine + n0 * sine, n0 * cosine - z * sine, size[:, None])
 
 
-def _least_squares_of_levers(parameters: Parameters, motions: Array, ways: Array) -> Array:
-    """
-    Return lower bounds (N, 6) of (k / L1)^2 between points, as far out of reach as they may be.
+class _Reserve(NamedTuple):
+    """The square of the lever times (L2 / L1)^2, |l|^2 - (u . l)^2 - g^2, at poses (N, 6)."""
 
-    motions (N + 1, MOTION): at the points. ways (N, 6): half the lengths of the paths of the
-    platform joints between them [m].
+    values: Array  # [m^2]
+    slopes: Array  # half of the largest change by the way of the platform joint [m]
+    distances: Array  # |l| [m]
+    g: Array  # [m]
 
-    (k / L1)^2 L2^2 = |l|^2 - (u . l)^2 - g^2 has the gradient 2 w, w = l - (u . l) u - g / L1 l,
-    which changes by at most 1 + (|l| / L1)^2 + |g| / L1 of the way from the nearer point.
-    """
+
+def _reserve_at(parameters: Parameters, motions: Array) -> _Reserve:
     u, _ = crank_axes(parameters)
     size, rod = parameters['legs.crank.length'], parameters['legs.rod.length']
     position, rotation = motions[:, _POSITION], motions[:, _ROTATION].reshape(-1, 3, 3)
@@ -458,19 +474,9 @@ def _least_squares_of_levers(parameters: Parameters, motions: Array, ways: Array
         rotation, parameters.geometry.platform_joints) - parameters.geometry.base_joints
     square, height = dot(line, line)[..., 0], dot(line, u)[..., 0]
     g = (square + (size * size - rod * rod)) / (2.0 * size)
-    values = (square - height ** 2 - g ** 2) / rod ** 2
-    slopes = np.linalg.norm(
-        line - height[..., None] * u - (g / size)[..., None] * line, axis=-1)
-
-    def larger(each: Array) -> Array:
-        return np.maximum(each[:-1], each[1:])
-
-    farthest = larger(np.sqrt(square)) + ways
-    most = larger(np.abs(g)) + farthest * ways / size
-    steepest = 2.0 / rod ** 2 * (larger(slopes) + ways * (
-        1.0 + (farthest / size) ** 2 + most / size))
-    least: Array = 0.5 * (values[:-1] + values[1:]) - steepest * ways
-    return np.minimum(least, np.minimum(values[:-1], values[1:]))
+    slopes: Array = np.linalg.norm(
+        (1.0 - g / size)[..., None] * line - height[..., None] * u, axis=-1)
+    return _Reserve(square - height ** 2 - g ** 2, slopes, np.sqrt(square), g)
 
 
 def _of_legs(parameters: Parameters) -> tuple[Array, Array, Array, Array]:

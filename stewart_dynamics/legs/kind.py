@@ -75,7 +75,6 @@ class IntervalBounds(NamedTuple):
     Of a leg whose joint has a velocity or acceleration of 1 (N, 6) each, or (6,).
     """
 
-    levers: Array  # least levers by their largest values
     gains: Array  # rates of the drives
     # Relative changes of ``gains`` and of the directions of the lines, by the path of the platform;
     # and the part of it that is due to levers, both (N,) [1/m].
@@ -359,15 +358,26 @@ class LegKind(ABC):
     def stop_loads(self, parameters: Parameters) -> StopLoads:
         """Return what the drives carry where they meet their end stops."""
 
+    def least_levers(self, parameters: Parameters, motions: Array, ends: Array, ways: Array,
+                     ) -> Array:
+        """
+        Return lower bounds (N, 6) of the squares of levers, by their largest ones, in intervals.
+
+        motions, ends (N, MOTION): rows of motion at both ends of each interval.
+        ways (N, 6): bounds of the ways of the platform joints between them [m].
+        """
+        del parameters, motions, ends
+        return np.ones(ways.shape)
+
     @abstractmethod
-    def bound_intervals(self, parameters: Parameters, motions: Array, results: Array,
-                        path: Array, levers: Array) -> IntervalBounds:
+    def bound_intervals(self, parameters: Parameters, results: Array, squares: Array,
+                        reach: Array) -> IntervalBounds:
         """
         Return bounds in the intervals between points.
 
-        motions, results (N + 1, ...): rows of motion and of results at the points.
-        path (N,): bound of the way of the platform from each point to the next [m].
-        levers (6,): ways of the platform joints by that of the platform.
+        results (N + 1, ...): rows of results at the points.
+        squares (N, 6): lower bounds of the squares of levers, by their largest ones.
+        reach (6,): ways of the platform joints by that of the platform.
         """
 
     @abstractmethod

@@ -190,8 +190,8 @@ class Telescopic(LegKind):
         return StopLoads(parameters.actuator.reflected_mass, float(np.sum(
             parameters.legs.piston.mass)), (ones, ones), ones, np.zeros(6))
 
-    def bound_intervals(self, parameters: Parameters, motions: Array, results: Array,
-                        path: Array, levers: Array) -> IntervalBounds:
+    def bound_intervals(self, parameters: Parameters, results: Array, squares: Array,
+                        reach: Array) -> IntervalBounds:
         """Return bounds by the lengths at the points."""
         lengths = results[:, self.position.columns]
         shorter = np.minimum(lengths[:-1], lengths[1:])
@@ -201,7 +201,7 @@ class Telescopic(LegKind):
         masses = piston.mass + (inertia + piston.mass * (
             np.maximum(lengths[:-1], lengths[1:]) - piston.center_of_mass) ** 2) / shorter ** 2
         ones = np.ones(6)
-        return IntervalBounds(ones, ones, 1.0 / shorter.min(axis=1), np.zeros(len(path)), masses, ones,
+        return IntervalBounds(ones, 1.0 / shorter.min(axis=1), np.zeros(len(shorter)), masses, ones,
                               parameters.actuator.reflected_mass, np.zeros(6))
 
     def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],

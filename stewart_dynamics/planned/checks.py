@@ -95,8 +95,8 @@ class Checks:
     load: the largest absolute effort so far as a part of its limit.
     lever, lever_time, lever_leg: smallest lever by its largest value so far, its time [s] and leg;
         infinite for legs whose levers do not change.
-    missing, missing_time, missing_words: largest distance by which a leg does not reach so far [m],
-        its time [s], and the leg in words.
+    missing, missing_time, missing_words: largest distance by which a leg does not reach so far
+        [m], its time [s], and the leg in words.
     """
 
     def __init__(self, parameters: Parameters) -> None:

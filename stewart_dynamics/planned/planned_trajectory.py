@@ -94,8 +94,10 @@ class PlannedTrajectory:
     torque_leg: int | None = None
     """Leg of the largest torque, 0 to 5."""
     lever: float = math.nan
-    """The smallest lever of a crank by the length of the crank, at points and between them: how near
-    the trajectory comes to a dead centre."""
+    """
+    The smallest lever of a crank by the length of the crank, at points and between them: how near
+    the trajectory comes to a dead centre.
+    """
     lever_time: float = math.nan
     """Time of the smallest lever [s]."""
     lever_leg: int | None = None
@@ -457,8 +459,9 @@ class _Work:
         effort = self._parameters.leg_kind.effort.name
         found |= {effort: checks.force, f'{effort}_leg': checks.force_leg}
         if math.isfinite(checks.lever):
-            message += (f', smallest lever {checks.lever:.4g} of its largest: '
-                        f'{self._parameters.joints[checks.lever_leg]} at {checks.lever_time:.3f} s')
+            joint = self._parameters.joints[checks.lever_leg]
+            message += (f', smallest lever {checks.lever:.4g} of its largest: {joint} at '
+                        f'{checks.lever_time:.3f} s')
             found |= {'lever': checks.lever, 'lever_time': checks.lever_time,
                       'lever_leg': checks.lever_leg}
         return PlannedTrajectory(

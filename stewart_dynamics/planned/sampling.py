@@ -21,6 +21,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.legs.kind import IntervalBounds
+from stewart_dynamics.mechanics.batch import lever_squares
 from stewart_dynamics.mechanics.drives.motor_limits import force_limits, rate_limits
 from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.limits import LIMITS, Limits
@@ -34,7 +35,11 @@ TOLERANCE = 0.005
 # by at most this part of that length.
 _STEP = 0.01
 # Between two samples a lever changes by at most about this part of itself.
-_OF_LEVER = 0.1
+_OF_LEVER = 0.15
+# Bounds of levers come nearer than this part to the smaller lever at both ends of a part of an
+# interval; the number of parts of a part that does not, and how often it is divided.
+_NEAR, _DIVIDED, _DEPTH = 0.5, 8, 5
+_BELOW = 0.09  # square of a lever that is far from a dead centre
 # At nearly one pose, forces are polynomials of at most 8th degree of time between two points: by
 # Markov's inequality this number of parts finds their largest value to 1 %.
 _ENOUGH = 64
@@ -85,21 +90,55 @@ class Sampling:
         largest: absolute effort that is known to occur in the trajectory [N] or [N m].
         """
         bounds = between.bounds(self._arm)
+        squares = self._squares_of_levers(durations, bounds, between, motions)
         legs = self._kind.bound_intervals(
-            self._parameters, motions, results, bounds.path, self._lever)
+            self._parameters, results, np.abs(squares), self._lever)
         # Accelerations of the joints and along the legs due to speed.
         inverse_radius = 1.0 / self._arm + legs.bends
         steps = np.maximum(bounds.path / (_STEP * self._arm),
                            bounds.path * legs.turning / _OF_LEVER)
         forces = self._force_parts(
             durations, bounds, legs, inverse_radius, results, drive_rates, bases, largest)
-        cubics = self._may_exceed_limits(durations, bounds, legs, inverse_radius, results)
+        cubics = self._may_exceed_limits(
+            durations, bounds, legs, inverse_radius, results, squares)
         parts: Array = np.maximum(np.maximum(np.ceil(steps), forces),
                                   np.where(cubics, float(_FEWEST), 1.0))
         return parts
 
+    def _squares_of_levers(self, durations: Array, bounds: Bounds, between: Interpolation,
+                           motions: Array) -> Array:
+        """
+        Return lower bounds (N, 6) of the squares of levers, by their largest ones.
+
+        Minus _BELOW where a lever certainly is below its limit: no fine samples are needed then.
+        """
+        kind, p, found = self._kind, self._parameters, np.ones((len(durations), 6))
+        if not kind.lever_limit:
+            return found
+        limit = self._limits.thresholds[kind.lever_limit] ** 2
+        which, begin = np.arange(len(durations)), np.zeros(len(durations))
+        rows, ends, ways = motions[:-1], motions[1:], bounds.path
+        for depth in range(_DEPTH + 1):
+            width = _DIVIDED ** -float(depth)
+            if depth:
+                rows, ends = between.at(which, begin), between.at(which, begin + width)
+                ways = bounds.speed[which] * durations[which] * width
+            least = kind.least_levers(p, rows, ends, ways[:, None] * self._lever)
+            smaller = np.minimum(*(lever_squares(p.structure, each)[0] for each in (rows, ends)))
+            low = smaller < limit
+            divided = (least < _NEAR ** 2 * smaller).any(axis=1) & (depth < _DEPTH)
+            np.minimum.at(found, which[~divided], np.maximum(least[~divided], 0.0))
+            np.minimum.at(found, which, np.where(low, -_BELOW, 1.0))
+            divided &= (found[which] >= 0.0).all(axis=1)
+            if not divided.any():
+                break
+            parts = np.arange(_DIVIDED) * width / _DIVIDED
+            which, begin = np.repeat(which[divided], _DIVIDED), (
+                begin[divided, None] + parts).ravel()
+        return found
+
     def _may_exceed_limits(self, durations: Array, bounds: Bounds, legs: IntervalBounds,
-                           inverse_radius: Array, results: Array) -> Flags:
+                           inverse_radius: Array, results: Array, squares: Array) -> Flags:
         """Return in which intervals a position, a rate or a lever may exceed its limit (N,)."""
         kind, square = self._kind, durations ** 2 / 8.0
         way = bounds.position_deviation + square * bounds.speed ** 2 * inverse_radius
@@ -112,7 +151,7 @@ class Sampling:
             | (_larger(np.abs(results[:, kind.rate.columns])) + self._rate_deviation(
                 durations, bounds, legs, inverse_radius) > self._fastest)).any(axis=1)
         if kind.lever_limit:
-            exceeding |= (legs.levers < self._limits.thresholds[kind.lever_limit]).any(axis=1)
+            exceeding |= (squares < self._limits.thresholds[kind.lever_limit] ** 2).any(axis=1)
         return exceeding
 
     def _rate_deviation(self, durations: Array, bounds: Bounds, legs: IntervalBounds,
