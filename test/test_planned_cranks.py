@@ -218,13 +218,13 @@ def test_verdicts_agree_with_dense_scans(first: int) -> None:
     assert len(reasons) > 4
 
 
-# One hexapod: what it says, and where.
+# One hexapod: messages, times and legs.
 
 FILE = ROOT / 'config' / 'crank_platform.yaml'
 RIG = Parameters.from_yaml(FILE)
-UNLIMITED = RIG.replaced({name: None for name in (
+UNLIMITED = RIG.replaced(dict.fromkeys((
     'limits.angle_min', 'limits.angle_max', 'limits.speed_max', 'limits.torque_max',
-    'limits.rod_force_max')})
+    'limits.rod_force_max')))
 HOME = StewartPlatform(RIG).home_pose()
 
 

@@ -285,8 +285,9 @@ class Crank(LegKind):
         """
         Return lower bounds of (k / L1)^2, negative where a rod may not reach.
 
-        (k / L1)^2 L2^2 = |l|^2 - (u . l)^2 - g^2 has the gradient 2 w, w = l - (u . l) u - g / L1 l,
-        which changes by at most 1 + (|l| / L1)^2 + |g| / L1 of the way from the nearer end.
+        (k / L1)^2 L2^2 = |l|^2 - (u . l)^2 - g^2 has the gradient 2 w with
+        w = l - (u . l) u - g / L1 l, which changes by at most 1 + (|l| / L1)^2 + |g| / L1 of the
+        way from the nearer end.
         """
         size, rod = parameters['legs.crank.length'], parameters['legs.rod.length']
         here, there = _reserve_at(parameters, motions), _reserve_at(parameters, ends)

@@ -72,12 +72,12 @@ class IntervalBounds(NamedTuple):
     """
     Bounds of six legs in each of N intervals, for platform joints that move in any direction.
 
-    Of a leg whose joint has a velocity or acceleration of 1 (N, 6) each, or (6,).
+    Each (N, 6) or (6,), for a joint with a velocity or acceleration of 1.
     """
 
     gains: Array  # rates of the drives
-    # Relative changes of ``gains`` and of the directions of the lines, by the path of the platform;
-    # and the part of it that is due to levers, both (N,) [1/m].
+    # Relative changes of ``gains`` and of the directions of the lines, by the path of the
+    # platform; and the part of it that is due to levers, both (N,) [1/m].
     bends: Array
     turning: Array
     masses: Array  # that the platform carries [kg]

@@ -201,8 +201,9 @@ class Telescopic(LegKind):
         masses = piston.mass + (inertia + piston.mass * (
             np.maximum(lengths[:-1], lengths[1:]) - piston.center_of_mass) ** 2) / shorter ** 2
         ones = np.ones(6)
-        return IntervalBounds(ones, 1.0 / shorter.min(axis=1), np.zeros(len(shorter)), masses, ones,
-                              parameters.actuator.reflected_mass, np.zeros(6))
+        return IntervalBounds(
+            ones, 1.0 / shorter.min(axis=1), np.zeros(len(shorter)), masses, ones,
+            parameters.actuator.reflected_mass, np.zeros(6))
 
     def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
                       ratios: Sequence[float]) -> str:

@@ -32,7 +32,7 @@ from stewart_dynamics.planned.planned_trajectory import check_in_pieces
 RATE = 100.0
 MOST_POINTS = 100_000
 # Share of the limit of rates that an approach uses; without that limit, characteristic lengths
-# per second, by which drives move platform joints at the best.
+# per second by which drives move platform joints at the best.
 _SPEED = 0.5
 _SPEED_WITHOUT_LIMIT = 0.1
 # Factor that lengthens a duration which exceeds limits of rate, force or motors; most trials.
@@ -81,7 +81,8 @@ def approach(platform: StewartPlatform, start: Pose | Motion, end: Pose | Motion
     Return a motion within all limits from rest in a pose to the first point of a motion.
 
     It takes half of ``limits.velocity_max``, or ``limits.speed_max`` of cranks, and longer where
-    forces, torques or motors would exceed their limits. Its points are 1 / rate apart, as a stream of setpoints needs them.
+    forces, torques or motors would exceed their limits. Its points are 1 / rate apart, as a stream
+    of setpoints needs them.
 
     Parameters
     ----------

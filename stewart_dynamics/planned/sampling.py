@@ -39,6 +39,7 @@ _OF_LEVER = 0.15
 # Bounds of levers come nearer than this part to the smaller lever at both ends of a part of an
 # interval; the number of parts of a part that does not, and how often it is divided.
 _NEAR, _DIVIDED, _DEPTH = 0.5, 8, 5
+_MOST_DIVIDED = 4096  # parts that are looked at together; more than intervals need in practice
 _BELOW = 0.09  # square of a lever that is far from a dead centre
 # At nearly one pose, forces are polynomials of at most 8th degree of time between two points: by
 # Markov's inequality this number of parts finds their largest value to 1 %.
@@ -131,6 +132,9 @@ class Sampling:
             np.minimum.at(found, which, np.where(low, -_BELOW, 1.0))
             divided &= (found[which] >= 0.0).all(axis=1)
             if not divided.any():
+                break
+            if _DIVIDED * np.count_nonzero(divided) > max(_MOST_DIVIDED, 2 * len(durations)):
+                np.minimum.at(found, which[divided], np.maximum(least[divided], 0.0))
                 break
             parts = np.arange(_DIVIDED) * width / _DIVIDED
             which, begin = np.repeat(which[divided], _DIVIDED), (
