@@ -214,7 +214,7 @@ def test_verdicts_agree_with_dense_scans(first: int) -> None:
         assert not wrong
         accepted += sum(each.accepted for each in results)
         reasons |= {each.limit or each.reason for each in results}
-    assert 5 < accepted < 35
+    assert 2 < accepted < 38
     assert len(reasons) > 4
 
 
