@@ -226,8 +226,8 @@ static double crank_rate_max(const stewart_leg * leg) {return leg->crank_speed_m
 static double crank_lever_ratio(const stewart_leg * leg, double lever)
 {return fabs(lever) / leg->crank_length;}
 
-/* The square of the lever [m^2], and its rate: (L1 / L2)^2 (x^2 + y^2 - g^2), the reserve of reach.
-   Unlike the lever it is smooth at a dead centre, and it is negative out of reach. */
+/* The square of the lever [m^2], and its rate: (L1 / L2)^2 (x^2 + y^2 - g^2), the reserve of
+   reach. Unlike the lever it is smooth at a dead centre, and it is negative out of reach. */
 typedef struct { double value, rate; } crank_reserve;
 
 static crank_reserve crank_reserve_of(const stewart_leg * leg, const stewart_motion * motion) {
