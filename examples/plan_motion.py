@@ -31,7 +31,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
-from stewart_dynamics import Capability, Motion, StewartPlatform
+from stewart_dynamics import Capability, Motion, Parameters, StewartPlatform
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_euler, to_quaternion
 from stewart_dynamics.messages.received import (
@@ -189,7 +189,8 @@ def main() -> None:
     parser.add_argument('--from', dest='start', help='[m, rad]; default: the pose of the measured '
                         'legs, on stewart_dynamics/measured_legs', **pose)
     parser.add_argument('--params', type=Path, default=CONFIG / 'platform.yaml', metavar='FILE',
-                        help="the node's parameters, for the pose of the measured legs and home")
+                        help="the node's parameters, for the pose of the measured legs, home and "
+                        'the unit of efforts')
     parser.add_argument('--to', help='[m, rad]; default: 60 mm above the home pose, or a quarter '
                         'of the way that is free there', **pose)
     parser.add_argument('--file', type=Path, metavar='CSV',
@@ -223,7 +224,8 @@ def main() -> None:
     last = answer.points[-1].time_from_start
     line = f'accepted: {len(answer.points)} points over {last.sec + 1e-9 * last.nanosec:g} s'
     if all(len(point.effort) for point in answer.points):  # the node's trajectory.effort
-        line += f', largest effort {max(np.abs(p.effort).max() for p in answer.points):.0f} N'
+        unit = Parameters.from_yaml(options.params).leg_kind.effort.unit
+        line += f', largest effort {max(np.abs(p.effort).max() for p in answer.points):.0f} {unit}'
     print(line)
 
 

@@ -18,7 +18,7 @@ pytest.importorskip('rclpy')
 
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from running import (  # noqa: E402
-    bits, DynamicsNode, ERROR, header, INPUTS, NODE, OK, ROOT, Sample, WARN)
+    bits, DynamicsNode, ERROR, header, INPUTS, NODE, OK, Planner, ROOT, Sample, WARN)
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import Float64MultiArray  # noqa: E402
 from stewart_dynamics import Capability, StewartPlatform  # noqa: E402
@@ -407,3 +407,20 @@ def test_pulses_are_suppressed_with_the_torques(start: Start, tmp_path: Path) ->
     node.state_of(node.send(home, stamp=node.stamp(LATER)))
     node.until(lambda: len(pulses) == 2, 'the next one')
     assert pulses[0] == pulses[1]
+
+
+def test_a_planned_trajectory_is_answered_or_rejected_by_the_name_of_the_leg(
+        node: DynamicsNode) -> None:
+    planner, samples = Planner(node), [HOME, Sample((0.02, 0.0, HEIGHT + 0.03)), HOME]
+    planner.send(samples, step=1_000_000_000)
+    answer = planner.until_answered(1)
+    assert len(answer.points) == 3
+    for point, sample in zip(answer.points, samples, strict=True):
+        result = PLATFORM.inverse_dynamics(sample.motion())
+        assert bits(point.positions) == bits(result.angles)
+        assert bits(point.velocities) == bits(result.speeds)
+        assert bits(point.effort) == bits(result.torques)
+    node.until_status('planned trajectory', OK, 'accepted: 3 points over 2 s, smallest lever')
+    assert 'largest torque (N m)' in node.values('planned trajectory')
+    planner.send([HOME, TOO_HIGH], step=1_000_000_000)
+    planner.until_rejected(' cannot reach: ', 1)

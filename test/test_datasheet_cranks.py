@@ -89,6 +89,7 @@ def test_figures_are_those_of_the_library(figures: dict[str, Any]) -> None:
     assert figures['payload']['limit'] == 'crank_torque_max'
     assert figures['box']['possible']
     assert figures['motion']['possible']
+    assert figures['motion']['between_setpoints']['reason'] is None
     assert figures['stiffness']['leg_stiffness'] == 2e4
     assert figures['stiffness']['frequencies'] == sorted(figures['stiffness']['frequencies'])
     assert figures['stuck_leg']['leg'] == 'leg_3'
@@ -149,7 +150,10 @@ def test_a_motion_at_its_factor_uses_a_limit_whole() -> None:
     used = uses(PLATFORM, recorded._replace(motion=Motion.of_rows(rows)))
     assert max(each.max() for each in used.values()) == pytest.approx(1.0, rel=1e-9)
     assert set(used) == {'angle', 'lever', 'speed', 'torque', 'rod force', 'singularity'}
-    assert 'available for telescopic legs alone' in found['between_setpoints']['reason']
+    between = found['between_setpoints']
+    assert between['reason'] is None
+    assert 0.99 * k < between['factor'] <= k
+    assert between['limit'] == found['limit']
 
 
 @pytest.mark.parametrize(('height', 'changes', 'limit'), [

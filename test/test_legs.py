@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 from referees import ROOT
 from stewart_dynamics import (
-    approach, calibrate, Capability, check_planned_trajectory, MotionCueing, ParameterError,
-    Parameters, Pose, StewartPlatform)
+    calibrate, Capability, MotionCueing, ParameterError, Parameters, Pose, StewartPlatform)
 from stewart_dynamics.calibration.pose_design import design_poses
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.export.drive_files import drive_files
@@ -26,8 +25,6 @@ from stewart_dynamics.identification.identification_options import Identificatio
 from stewart_dynamics.identification.identify import Identification
 from stewart_dynamics.identification.motion_design import design, DesignOptions
 from stewart_dynamics.legs import CRANK, require_kind, TELESCOPIC
-from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.planned.trajectory_messages import answer, NOT_AVAILABLE
 from stewart_dynamics.program import BAD_INPUT
 
 CONFIG = ROOT / 'config'
@@ -43,10 +40,7 @@ PROGRAMS = {
     'stewart_export --fmu --drives': '--drives', 'stewart_export --linuxcnc': LINUXCNC,
     'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification'}
 NODES = {
-    f'stewart_cueing --ros-args --params-file {CRANK_FILE}': 'motion cueing',
-    'stewart_trajectory --ros-args -p motion.type:=response -p '
-    'motion.initial:=[0.0,0.0,0.65,0.0,0.0,0.0] -p '
-    f'motion.response.params_file:={CRANK_FILE}': 'motion response within limits'}
+    f'stewart_cueing --ros-args --params-file {CRANK_FILE}': 'motion cueing'}
 
 
 def run(folder: Path, program: str, *arguments: str | Path) -> tuple[int, str, str]:
@@ -76,15 +70,9 @@ def test_a_node_that_does_not_know_a_kind_does_not_start(tmp_path: Path, command
     assert err == f'{program}: {CRANK_FILE}: {NOT_FOR_CRANKS.format(NODES[command])}\n'
 
 
-def planned(platform: StewartPlatform) -> object:
-    return check_planned_trajectory(
-        platform, [0.0, 1.0], Motion.from_pose(Pose(np.zeros((2, 3)), [np.eye(3)] * 2)))
-
-
 CALLS: dict[str, Callable[[StewartPlatform], object]] = {
     'clearance between legs': lambda platform: Capability(platform).clearance(
         platform.home_pose()),
-    'planned trajectories': planned,
     'motion cueing': lambda platform: MotionCueing(platform.parameters),
     'calibration': lambda platform: calibrate(
         platform, np.zeros((20, 6)), Pose(np.zeros((20, 3)), [np.eye(3)] * 20)),
@@ -103,17 +91,6 @@ def test_a_call_that_does_not_know_a_kind_raises_one_line(feature: str) -> None:
     with pytest.raises(ParameterError) as found:
         CALLS[feature](StewartPlatform(CRANKS))
     assert str(found.value) == f'{CRANK_FILE}: {NOT_FOR_CRANKS.format(feature.strip())}'
-
-
-def test_an_approach_and_a_planned_trajectory_of_another_kind_are_rejected() -> None:
-    home = StewartPlatform(CRANKS).home_pose()
-    with pytest.raises(ParameterError, match='planned trajectories: available for telescopic'):
-        approach(StewartPlatform(CRANKS), home, home)
-    outcome, = answer(CRANKS, (0.0,) * 6, b'')
-    assert outcome is not None
-    assert outcome.reason == NOT_AVAILABLE
-    assert outcome.message == (f'rejected: {NOT_AVAILABLE}: {CRANK_FILE}: '
-                               + NOT_FOR_CRANKS.format('planned trajectories'))
 
 
 def test_a_feature_may_know_several_kinds() -> None:

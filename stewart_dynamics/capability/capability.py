@@ -575,7 +575,6 @@ class Capability:
             raise MotionError('continuous: must be False for a motion: drive.torque_continuous '
                               'limits what is held at rest')
         if times is not None:
-            self._check_between()
             return timed(
                 times, motion, lambda each, _: self.payload(
                     each, center_of_mass, wrench=wrench, base=base),
@@ -635,7 +634,6 @@ class Capability:
 
         """
         if times is not None:
-            self._check_between()
             return timed(times, motion, lambda each, _: self.speed_factor(each, wrench, base),
                          lambda k: (self.platform, faster(motion.rows, k), k), wrench, base)
         solved = self.platform.inverse_dynamics(motion, singular='nan')
@@ -682,7 +680,6 @@ class Capability:
         start = self._single(Pose(motion.position[0], motion.rotation[0]) if center is None
                              else center)
         if times is not None:
-            self._check_between()
             return timed(
                 times, motion, lambda each, most: self._amplitude(each, start, wrench, base, most),
                 lambda k: (self.platform, Deviations(start, motion.rows).at(k), 1.0), wrench, base)
@@ -805,9 +802,6 @@ class Capability:
 
     def _drive_rates(self, rows: Array, results: Array) -> Array:
         return self.platform.drive_rates(rows, results[..., self._kind.rate.columns])
-
-    def _check_between(self) -> None:
-        require_kind(self.platform.parameters, 'a motion between its samples')
 
     def load_rows(self, motion: Motion, wrench: ArrayLike | None = None,
                   base: BaseMotion | None = None, platform: StewartPlatform | None = None,

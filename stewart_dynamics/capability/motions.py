@@ -20,7 +20,7 @@ from stewart_dynamics.mechanics.frames.motion import check_kind, Motion
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY,
-    POSITION, RATES, ROTATION, TWIST)
+    POSITION, ROTATION, TWIST)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.interpolation import (
     Interpolation, motion_of, rates_of_vector, rotation_vector)
@@ -126,8 +126,8 @@ def timed(times: ArrayLike, motion: Any, ask: Callable[[Motion, float], Answer],
         Motion.of_rows(rows), wrench, base, singular='nan').rows
     with np.errstate(all='ignore'):  # numbers that overflow need too many samples
         parts = Sampling(platform.parameters, 0.0).parts(
-            durations / speed, Interpolation(durations / speed, rows), results,
-            platform.drive_rates(rows, results[:, RATES]),
+            durations / speed, Interpolation(durations / speed, rows), rows, results,
+            platform.drive_rates(rows, results[:, platform.parameters.leg_kind.rate.columns]),
             None if base is None else base.rows[None], math.inf)
     near = parts <= MOST_SAMPLES  # not where they are nan
     if not near.all():

@@ -226,12 +226,12 @@ static double crank_rate_max(const stewart_leg * leg) {return leg->crank_speed_m
 static double crank_lever_ratio(const stewart_leg * leg, double lever)
 {return fabs(lever) / leg->crank_length;}
 
-/* The square of the lever is (L1 / L2)^2 (x^2 + y^2 - g^2), the reserve of reach: unlike the
-   lever it is smooth at a dead centre, so that its rate shows when the least lever is reached. */
-static double crank_lever_time(
-  const stewart_leg * leg, const stewart_motion * motion, double lever) {
-  double size = leg->crank_length, least_lever = leg->lever_min * size;
-  double left = lever * lever - least_lever * least_lever;
+/* The square of the lever [m^2], and its rate: (L1 / L2)^2 (x^2 + y^2 - g^2), the reserve of
+   reach. Unlike the lever it is smooth at a dead centre, and it is negative out of reach. */
+typedef struct { double value, rate; } crank_reserve;
+
+static crank_reserve crank_reserve_of(const stewart_leg * leg, const stewart_motion * motion) {
+  double size = leg->crank_length;
   vector z = read3(leg->crank_direction), n0 = cross(read3(leg->crank_axis), z);
   vector arm = rotate(motion->rotation, read3(leg->platform_joint));
   vector l = subtract(add(read3(motion->position), arm), read3(leg->base_joint));
@@ -240,7 +240,17 @@ static double crank_lever_time(
   double g = (dot(l, l) + size * size - leg->rod_length * leg->rod_length) * (0.5 / size);
   double reserve_rate = 2.0 * (dot(l, z) * dot(l_rate, z) + dot(l, n0) * dot(l_rate, n0) -
                                g * dot(l, l_rate) / size);
-  double part = size / leg->rod_length, rate = part * part * reserve_rate;
+  double part = size / leg->rod_length;
+  double reserve = dot(l, z) * dot(l, z) + dot(l, n0) * dot(l, n0) - g * g;
+  crank_reserve of = {part * part * reserve, part * part * reserve_rate};
+  return of;
+}
+
+static double crank_lever_time(
+  const stewart_leg * leg, const stewart_motion * motion, double lever) {
+  double least_lever = leg->lever_min * leg->crank_length;
+  double left = lever * lever - least_lever * least_lever;
+  double rate = crank_reserve_of(leg, motion).rate;
   if (!(left > 0.0)) {return 0.0;}
   return rate < 0.0 ? -left / rate : HUGE_VAL;
 }
@@ -359,6 +369,16 @@ static measured_leg crank_measured(const stewart_leg * leg, const stewart_motion
   if (lever.ratio >= 0.0 && pace < HUGE_VAL) {to.pace = pace;}
   return to;
 }
+
+static lever_square crank_square(const stewart_leg * leg, const stewart_motion * motion) {
+  crank_reserve reserve = crank_reserve_of(leg, motion);
+  double per_square = 1.0 / (leg->crank_length * leg->crank_length);
+  lever_square of = {per_square * reserve.value, per_square * reserve.rate};
+  return of;
+}
+
+static vector crank_anchor_rate(const stewart_leg * leg, const stewart_motion * motion)
+{return crank_motion_of(leg, motion).tip_rate;}
 
 static void crank_mass(
   const stewart_platform * platform, int i, const stewart_motion * motion, const leg_motion * of,

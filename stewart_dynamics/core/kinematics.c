@@ -35,6 +35,17 @@ void missing_many(
   }
 }
 
+void lever_squares_many(
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  double * values, double * rates) {
+  for (int64_t n = 0; n < count; n++) {
+    for (int i = 0; i < 6; i++) {
+      lever_square of = lever_square_of(platform, i, &motions[n]);
+      values[6 * n + i] = of.value, rates[6 * n + i] = of.rate;
+    }
+  }
+}
+
 FLAT void forward_kinematics_many(
   const stewart_platform * platform, int64_t count, const double * positions,
   stewart_motion * motions, int64_t * codes, int64_t * steps, double * residuals) {
@@ -85,6 +96,7 @@ void joint_haversines_many(
       vector s = at.direction;
       double known = 0.0 < at.length && at.length < HUGE_VAL ? 1.0 : NAN;
       vector x_rate = add(read3(motions[n].linear_velocity), cross(omega, at.arm));
+      x_rate = subtract(x_rate, anchor_rate_of(platform, i, &motions[n]));
       vector s_rate = scale(at.per_length, subtract(x_rate, scale(dot(s, x_rate), s)));
       vector axis = read3(leg->base_joint_axis), half = subtract(axis, s);
       values[12 * n + i] = known * 0.25 * dot(half, half);

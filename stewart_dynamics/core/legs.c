@@ -55,9 +55,14 @@ typedef struct { double ratio, of_drive; vector of_joint; } lever_slope;
 /* A leg as it is measured, how fast it changes [1/s], and its lever. */
 typedef struct { double position, rate, pace; lever_slope lever; } measured_leg;
 
+/* The square of the lever's ratio and its rate: smooth at a dead centre, and negative where a leg
+   does not reach. */
+typedef struct { double value, rate; } lever_square;
+
 /* Of a kind of legs, for the library:
    position: that of the drive, nan where it does not reach. drive_row: the row of J_q, with moments
-   times per_size. measured: in a motion. mass, columns: see the structures.
+   times per_size. measured: in a motion. square: of the lever. anchor_rate: of the end of the line that
+   is not at the platform. mass, columns: see the structures.
    momentum_rate: of the leg's momentum, and of its moment of momentum about the base's origin. */
 #define STEWART_LIBRARY
 #include "telescopic.h"
@@ -82,6 +87,20 @@ static measured_leg measured_of(
   const stewart_platform * platform, int i, const stewart_motion * motion) {
   switch (platform->leg_kind) {
     default: STEWART_LEG_KINDS(RETURN, measured, (&platform->legs[i], motion))
+  }
+}
+
+static lever_square lever_square_of(
+  const stewart_platform * platform, int i, const stewart_motion * motion) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, square, (&platform->legs[i], motion))
+  }
+}
+
+static vector anchor_rate_of(
+  const stewart_platform * platform, int i, const stewart_motion * motion) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, anchor_rate, (&platform->legs[i], motion))
   }
 }
 

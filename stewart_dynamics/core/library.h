@@ -186,6 +186,12 @@ void missing_many(
   const stewart_platform * platform, int64_t count, const stewart_pose * poses,
   double * distances);
 
+/* Squares of the levers by their largest values, and their rates [1/s], both (count, 6): smooth at
+   dead centres, and negative where a leg does not reach. */
+void lever_squares_many(
+  const stewart_platform * platform, int64_t count, const stewart_motion * motions,
+  double * values, double * rates);
+
 /* Poses of positions of the drives (count, 6) into motions, which have the guesses. */
 void forward_kinematics_many(
   const stewart_platform * platform, int64_t count, const double * positions,

@@ -274,6 +274,18 @@ static measured_leg telescopic_measured(const stewart_leg * leg, const stewart_m
   return of;
 }
 
+static lever_square telescopic_square(const stewart_leg * leg, const stewart_motion * motion) {
+  lever_square of = {1.0, 0.0};
+  (void)leg, (void)motion;
+  return of;
+}
+
+static vector telescopic_anchor_rate(const stewart_leg * leg, const stewart_motion * motion) {
+  vector none = {0.0, 0.0, 0.0};
+  (void)leg, (void)motion;
+  return none;
+}
+
 static void telescopic_mass(
   const stewart_platform * platform, int i, const stewart_motion * motion, const leg_motion * of,
   leg_mass * to) {

@@ -16,7 +16,7 @@ from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
 from stewart_dynamics.legs.kind import (
-    AtHome, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
+    AtHome, IntervalBounds, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import (
     AnchorCircles, AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
@@ -34,6 +34,7 @@ COULOMB_VELOCITY = 0.01
 HEADINGS, AXES, DIRECTIONS = (
     'geometry.crank_angles', 'geometry.crank_axes', 'geometry.crank_directions')
 _LEVERS = places('stewart_result')['levers']
+_POSITION, _ROTATION = (places('stewart_motion')[each] for each in ('position', 'rotation'))
 # A stop near a dead centre is expected to end motions before half of its lever, or before this.
 _DEEPEST = 0.5
 _LEAST_LEVER = 0.01
@@ -52,6 +53,7 @@ class Crank(LegKind):
     decimals = -1
     position_limits = 'limits.angle_min', 'limits.angle_max'
     rate_limit, effort_limit = 'limits.speed_max', 'limits.torque_max'
+    period = 2.0 * math.pi
     lever_limit, ends_differ = 'limits.lever_min', True
     joint_force, joint_force_limit = 'rod_force', 'limits.rod_force_max'
     commands = 'torques'
@@ -279,6 +281,46 @@ class Crank(LegKind):
             inertia, float(np.sum(parameters['legs.rod.mass'])), (least * size, size),
             1.0 + 1.25 * (1.0 + size / rods) ** 2, 5.0 / rods ** 2)
 
+    def least_levers(self, parameters: Parameters, motions: Array, ends: Array, ways: Array,
+                     ) -> Array:
+        """
+        Return lower bounds of (k / L1)^2, negative where a rod may not reach.
+
+        (k / L1)^2 L2^2 = |l|^2 - (u . l)^2 - g^2 has the gradient 2 w with
+        w = l - (u . l) u - g / L1 l, which changes by at most 1 + (|l| / L1)^2 + |g| / L1 of the
+        way from the nearer end.
+        """
+        size, rod = parameters['legs.crank.length'], parameters['legs.rod.length']
+        here, there = _reserve_at(parameters, motions), _reserve_at(parameters, ends)
+        half = 0.5 * ways
+        farthest = np.maximum(here.distances, there.distances) + half
+        most = np.maximum(np.abs(here.g), np.abs(there.g)) + farthest * half / size
+        steepest = np.maximum(here.slopes, there.slopes) + half * (
+            1.0 + (farthest / size) ** 2 + most / size)
+        least: Array = (0.5 * (here.values + there.values) - 2.0 * steepest * half) / rod ** 2
+        return least
+
+    def bound_intervals(self, parameters: Parameters, results: Array, squares: Array,
+                        reach: Array) -> IntervalBounds:
+        """
+        Return bounds by the least ratio r = |k| / L1 of a lever in each interval.
+
+        With a joint at the speed 1, q' is at most 1 / (r L1), the rod turns at most by
+        (1 + 1 / r) / L2, and by k' / L1 = n . B' / L2 - q' (L1 / L2 + d . e) the lever changes, of
+        itself, by at most (1 + (1 + L1 / L2) / r) / r of 1 / L2 and of 1 / L1.
+        """
+        inertia, crank_end, coupling, end = (np.abs(each) for each in _of_legs(parameters))
+        size, rod = parameters['legs.crank.length'], parameters['legs.rod.length']
+        least = np.maximum(_DEEPEST * parameters['limits.lever_min'], _LEAST_LEVER)
+        r = np.sqrt(np.maximum(squares, least ** 2))
+        turning = ((1.0 / rod + (1.0 / size + 1.0 / rod) / r) / r * reach).max(axis=1)
+        bends = turning + ((1.0 + 1.0 / r) / rod * reach).max(axis=1)
+        inertia = inertia + parameters['actuator.reflected_inertia']
+        gains = 1.0 / (r * size)
+        return IntervalBounds(
+            gains, bends, turning, end + coupling / r, size, inertia * gains + size * coupling,
+            np.maximum(end + coupling / r, coupling + crank_end / r))
+
     def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
                       ratios: Sequence[float]) -> str:
         """Return the leg that is nearest to a dead centre."""
@@ -415,6 +457,28 @@ def _angle_of(parameters: Parameters, position: Array, rotation: Array) -> _Angl
     h = legs['branch'] * np.sqrt(square - g * g)
     cosine, sine = ((x * g + y * h) / square)[..., None], ((y * g - x * h) / square)[..., None]
     return _Angle(arms, line, z * cosine + n0 * sine, n0 * cosine - z * sine, size[:, None])
+
+
+class _Reserve(NamedTuple):
+    """The square of the lever times (L2 / L1)^2, |l|^2 - (u . l)^2 - g^2, at poses (N, 6)."""
+
+    values: Array  # [m^2]
+    slopes: Array  # half of the largest change by the way of the platform joint [m]
+    distances: Array  # |l| [m]
+    g: Array  # [m]
+
+
+def _reserve_at(parameters: Parameters, motions: Array) -> _Reserve:
+    u, _ = crank_axes(parameters)
+    size, rod = parameters['legs.crank.length'], parameters['legs.rod.length']
+    position, rotation = motions[:, _POSITION], motions[:, _ROTATION].reshape(-1, 3, 3)
+    line = position[:, None] + joint_arms(
+        rotation, parameters.geometry.platform_joints) - parameters.geometry.base_joints
+    square, height = dot(line, line)[..., 0], dot(line, u)[..., 0]
+    g = (square + (size * size - rod * rod)) / (2.0 * size)
+    slopes: Array = np.linalg.norm(
+        (1.0 - g / size)[..., None] * line - height[..., None] * u, axis=-1)
+    return _Reserve(square - height ** 2 - g ** 2, slopes, np.sqrt(square), g)
 
 
 def _of_legs(parameters: Parameters) -> tuple[Array, Array, Array, Array]:

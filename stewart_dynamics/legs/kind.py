@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
@@ -67,6 +68,24 @@ class StopLoads(NamedTuple):
     at_joints: Array
 
 
+class IntervalBounds(NamedTuple):
+    """
+    Bounds of six legs in each of N intervals, for platform joints that move in any direction.
+
+    Each (N, 6) or (6,), for a joint with a velocity or acceleration of 1.
+    """
+
+    gains: Array  # rates of the drives
+    # Relative changes of ``gains`` and of the directions of the lines, by the path of the
+    # platform; and the part of it that is due to levers, both (N,) [1/m].
+    bends: Array
+    turning: Array
+    masses: Array  # that the platform carries [kg]
+    pushes: Array  # efforts by a push along the line
+    efforts: Array  # efforts without a push
+    ends: Array  # forces along the line without a push of the platform, at either end [kg]
+
+
 class Solid(NamedTuple):
     """A cylinder of each leg, as pictures show it."""
 
@@ -115,6 +134,8 @@ class LegKind(ABC):
         Limits of the drive's position, the smallest and the largest.
     rate_limit, effort_limit : str
         Limits of its rate, and of its effort, to which commands are clipped.
+    period : float
+        Positions of the drive that differ by it are the same; infinite: none are.
     lever_limit : str
         Limit of the smallest lever by its largest value; empty: levers do not change.
     joint_force, joint_force_limit : str
@@ -177,6 +198,7 @@ class LegKind(ABC):
     position_limits: tuple[str, str]
     rate_limit: str
     effort_limit: str
+    period: float = math.inf
     lever_limit: str = ''
     joint_force: str = 'joint_force'
     joint_force_limit: str
@@ -341,6 +363,28 @@ class LegKind(ABC):
     @abstractmethod
     def stop_loads(self, parameters: Parameters) -> StopLoads:
         """Return what the drives carry where they meet their end stops."""
+
+    def least_levers(self, parameters: Parameters, motions: Array, ends: Array, ways: Array,
+                     ) -> Array:
+        """
+        Return lower bounds (N, 6) of the squares of levers, by their largest ones, in intervals.
+
+        motions, ends (N, MOTION): rows of motion at both ends of each interval.
+        ways (N, 6): bounds of the ways of the platform joints between them [m].
+        """
+        del parameters, motions, ends
+        return np.ones(ways.shape)
+
+    @abstractmethod
+    def bound_intervals(self, parameters: Parameters, results: Array, squares: Array,
+                        reach: Array) -> IntervalBounds:
+        """
+        Return bounds in the intervals between points.
+
+        results (N + 1, ...): rows of results at the points.
+        squares (N, 6): lower bounds of the squares of levers, by their largest ones.
+        reach (6,): ways of the platform joints by that of the platform.
+        """
 
     @abstractmethod
     def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],

@@ -13,7 +13,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.legs import telescopic_tree as tree
 from stewart_dynamics.legs.kind import (
-    LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
+    IntervalBounds, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import Lines, lines_from, per_leg, skew, transposed
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, SLIDE, UNIVERSAL
 from stewart_dynamics.legs.tree import BARREL, LegBranch, ROD
@@ -190,6 +190,21 @@ class Telescopic(LegKind):
         ones = np.ones(6)
         return StopLoads(parameters.actuator.reflected_mass, float(np.sum(
             parameters.legs.piston.mass)), (ones, ones), ones, np.zeros(6))
+
+    def bound_intervals(self, parameters: Parameters, results: Array, squares: Array,
+                        reach: Array) -> IntervalBounds:
+        """Return bounds by the lengths at the points."""
+        lengths = results[:, self.position.columns]
+        shorter = np.minimum(lengths[:-1], lengths[1:])
+        piston, cylinder = parameters.legs.piston, parameters.legs.cylinder
+        inertia = (cylinder.mass * cylinder.center_of_mass ** 2 + cylinder.inertia
+                   + piston.inertia)
+        masses = piston.mass + (inertia + piston.mass * (
+            np.maximum(lengths[:-1], lengths[1:]) - piston.center_of_mass) ** 2) / shorter ** 2
+        ones = np.ones(6)
+        return IntervalBounds(
+            ones, 1.0 / shorter.min(axis=1), np.zeros(len(shorter)), masses, ones,
+            parameters.actuator.reflected_mass, np.zeros(6))
 
     def nearest_fault(self, joints: Sequence[str], positions: Sequence[float],
                       ratios: Sequence[float]) -> str:

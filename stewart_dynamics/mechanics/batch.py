@@ -112,6 +112,18 @@ def missing_distances(hexapod: Records, poses: Array) -> Array:
     return distances
 
 
+def lever_squares(hexapod: Records, motions: Array) -> tuple[Array, Array]:
+    """
+    Return squares of the levers by their largest values, and rates [1/s], both (N, 6).
+
+    motions (N, MOTION). Unlike the levers they are smooth at dead centres; negative where a leg
+    does not reach.
+    """
+    values, rates = (np.empty((len(motions), 6)) for _ in range(2))
+    function('lever_squares_many')(hexapod, len(motions), compact(motions), values, rates)
+    return values, rates
+
+
 def find_unreachable(hexapod: Records, joints: Sequence[str], rows: Array, results: Array,
                      shape: tuple[int, ...], singular: str = 'raise') -> Integers:
     """

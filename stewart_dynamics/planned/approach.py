@@ -22,8 +22,8 @@ from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import optional_array, wrong_type
 from stewart_dynamics.mechanics.frames.base_motion import base_rows, BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
-from stewart_dynamics.mechanics.limits import OF_LOADS, OF_MOTORS, OF_RATES
-from stewart_dynamics.mechanics.rows import MOTION, POSE, RATES, WRENCH
+from stewart_dynamics.mechanics.limits import limits_of, OF_MOTORS
+from stewart_dynamics.mechanics.rows import MOTION, POSE, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.interpolation import Interpolation
 from stewart_dynamics.planned.planned_trajectory import check_in_pieces
@@ -31,8 +31,8 @@ from stewart_dynamics.planned.planned_trajectory import check_in_pieces
 # Points of a motion per second.
 RATE = 100.0
 MOST_POINTS = 100_000
-# Share of limits.velocity_max that an approach uses; without that limit, characteristic lengths
-# per second.
+# Share of the limit of rates that an approach uses; without that limit, characteristic lengths
+# per second by which drives move platform joints at the best.
 _SPEED = 0.5
 _SPEED_WITHOUT_LIMIT = 0.1
 # Factor that lengthens a duration which exceeds limits of rate, force or motors; most trials.
@@ -80,8 +80,9 @@ def approach(platform: StewartPlatform, start: Pose | Motion, end: Pose | Motion
     """
     Return a motion within all limits from rest in a pose to the first point of a motion.
 
-    It takes half of ``limits.velocity_max``, and longer where forces or motors would exceed
-    their limits. Its points are 1 / rate apart, as a stream of setpoints needs them.
+    It takes half of ``limits.velocity_max``, or ``limits.speed_max`` of cranks, and longer where
+    forces, torques or motors would exceed their limits. Its points are 1 / rate apart, as a stream
+    of setpoints needs them.
 
     Parameters
     ----------
@@ -124,6 +125,7 @@ def approach_in_pieces(platform: StewartPlatform, start: Array, end: Array, wren
     Start and end are rows of motion (MOTION,), the wrench (WRENCH,), the base (BASE,).
     """
     duration, message = _first_duration(platform, start, end), ''
+    known = limits_of(platform.parameters)
     for _ in range(_MOST_TRIALS):
         duration = math.ceil(duration * rate - 1e-9) / rate
         found = _quintic(start, end, duration, rate)
@@ -137,21 +139,25 @@ def approach_in_pieces(platform: StewartPlatform, start: Array, end: Array, wren
             yield found
             return
         message = f'approach over {duration:.3g} s: {result.message}'
-        if result.limit not in (*OF_RATES, *OF_LOADS, *OF_MOTORS):
+        if result.limit not in (*known.rates, *known.loads, *OF_MOTORS):
             break
         duration *= _SLOWER
     raise MotionError(message)
 
 
 def _first_duration(platform: StewartPlatform, begin: Array, finish: Array) -> float:
-    """Return the time that the rates of the legs need."""
+    """Return the time that the rates of the drives need."""
+    p = platform.parameters
+    kind = p.leg_kind
     at_rest = finish.copy()
     at_rest[POSE.stop:] = 0.0
     part = np.linspace(0.0, 1.0, 65)
     between = Interpolation(np.ones(1), np.stack([begin, at_rest]))
-    rates = np.abs(platform.solve(between.at(np.zeros(65, dtype=np.int64), part))[:, RATES])
-    limit = platform.parameters.limits.velocity_max
-    fastest = (_SPEED_WITHOUT_LIMIT * platform.parameters.singularity.characteristic_length
+    rates = np.abs(platform.solve(between.at(np.zeros(65, dtype=np.int64), part))[
+        :, kind.rate.columns])
+    rates[~np.isfinite(rates)] = 0.0  # the check rejects poses that a leg does not reach
+    limit = p[kind.rate_limit]
+    fastest = (_SPEED_WITHOUT_LIMIT * p.singularity.characteristic_length / kind.reach(p)
                if limit is None else _SPEED * limit)
     return max(float(np.nan_to_num((rates / fastest).max())), 2.0 / RATE)
 

@@ -4,18 +4,21 @@
 """
 The checks of a planned trajectory: limits and singularities, at samples and between them.
 
-Between two samples, lengths and rates of the legs, det(J) and sin^2(angle / 2) of the joints are
-cubics in time through their values and derivatives at both. The clearance of the legs falls by
-no more than the platform joints, and corners of its plate, move.
+Between two samples, positions and rates of the drives, squares of levers, det(J) and
+sin^2(angle / 2) of the joints are cubics in time through their values and derivatives at both. The
+clearance of the legs falls by no more than the platform joints, and corners of its plate, move.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.mechanics.batch import (
+    find_unreachable, lever_squares, missing_distances, unreached)
 from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.mechanics.drives.motor_limits import exceeds
 from stewart_dynamics.mechanics.drives.motors import (
@@ -24,11 +27,10 @@ from stewart_dynamics.mechanics.drives.motors import (
 from stewart_dynamics.mechanics.dynamics.friction import Friction
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, CLEARANCE_MIN, Exceedance, LENGTH_MAX, LENGTH_MIN, LIMITS, result_values,
-    SPEED_MAX, TEMPERATURE_RISE_MAX, VELOCITY_MAX)
+    ANGLES, CLEARANCE_MIN, Exceedance, LIMITS, result_values, SPEED_MAX, TEMPERATURE_RISE_MAX)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, UNIT_LOAD_FORCES)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.interpolation import Cubics
 from stewart_dynamics.planned.sampling import TOLERANCE
@@ -43,6 +45,8 @@ _CLEARANCE = 1e-4
 
 LIMIT = 'a limit is exceeded'
 SINGULAR = 'a singularity is met'
+UNREACHABLE = 'out of reach'
+JUMPS = 'a drive leaves its turn'
 
 
 class Violation(NamedTuple):
@@ -84,17 +88,23 @@ class Checks:
     Finds violations in samples of a trajectory that come in the order of time.
 
     violations: violations found so far, in no order.
-    mistake: the likely mistake in the first pose with a leg too long or too short, empty without
-        one; None without such a pose.
+    mistake: the likely mistake in the first pose in which a drive is outside its range, or which a
+        leg does not reach; empty without one; None without such a pose.
     condition_number, condition_time: largest condition number so far, and its time [s].
-    force, force_leg: largest absolute force so far [N], and its leg.
-    load: the largest absolute force so far as a part of limits.force_max.
+    force, force_leg: largest absolute effort of a drive so far [N] or [N m], and its leg.
+    load: the largest absolute effort so far as a part of its limit.
+    lever, lever_time, lever_leg: smallest lever by its largest value so far, its time [s] and leg;
+        infinite for legs whose levers do not change.
+    missing, missing_time, missing_words: largest distance by which a leg does not reach so far
+        [m], its time [s], and the leg in words.
     """
 
     def __init__(self, parameters: Parameters) -> None:
         self.violations: list[Violation] = []
         self.condition_number, self.condition_time = 0.0, 0.0
         self.force, self.force_leg, self.load = -1.0, 0, 0.0
+        self.lever, self.lever_time, self.lever_leg = math.inf, 0.0, 0
+        self.missing, self.missing_time, self.missing_words = 0.0, 0.0, ''
         self._strongest = np.zeros(6)
         self._joints = parameters.joints
         poses = PoseLimits(parameters)
@@ -103,24 +113,25 @@ class Checks:
         self._drives, self._motor_limits = poses.drives, poses.motors
         self._clearance_tolerance = _CLEARANCE * parameters.singularity.characteristic_length
         self._friction = Friction.of(parameters)
-        self._parameters = parameters
+        self._parameters, self._kind = parameters, parameters.leg_kind
+        self._efforts = self._kind.effort.columns
         self._rises = np.zeros(6)
         self.mistake: str | None = None
 
     def check(self, samples: Samples) -> list[int]:
         """Check samples and between them; return after which of them closer ones are needed."""
         self._check_joints(samples)
-        unclear = {*self._check_motors(samples), *self._check_clearance(samples)}
+        unclear = {*self._check_motors(samples), *self._check_clearance(samples),
+                   *self._check_levers(samples)}
         finite = np.isfinite(samples.results).all(axis=1)
         if not finite.all():
             n = int(np.argmin(finite))
-            self.violations.append(Violation(
-                float(samples.times[n]), OUT_OF_RANGE, f': {OUT_OF_RANGE}'))
+            self._note_no_result(samples, n)
             if n == 0:
                 return sorted(unclear)
             samples = samples.until(n)
         results = samples.results
-        self._keep_largest_force(results[:, FORCES])
+        self._keep_largest_force(results[:, self._efforts])
         for limit, values in result_values(self._parameters, results).items():
             self._check_limit(limit, values, _of_legs(samples.times))
         self._name_mistake(samples)
@@ -129,17 +140,83 @@ class Checks:
             *unclear, *self._check_singularities(samples), *self._reversals(samples)})
 
     def _name_mistake(self, samples: Samples) -> None:
-        """Name the likely mistake in the pose with which legs first are too long or too short."""
-        found = [each for each in self.violations if each.limit in (LENGTH_MIN, LENGTH_MAX)]
+        """Name the likely mistake in the pose with which drives first are outside their ranges."""
+        found = [each for each in self.violations if each.limit in self._kind.position_limits]
         if found and self.mistake is None:
             at = int(np.argmax(samples.times >= found[0].time))
             self.mistake = pose_mistake(self._parameters, samples.motions[at], first=False)
 
+    def _note_no_result(self, samples: Samples, n: int) -> None:
+        """Note that a sample has no results: a leg does not reach, or numbers overflow."""
+        unreachable = find_unreachable(
+            self._parameters.structure, self._joints, samples.motions, samples.results,
+            samples.times.shape, 'nan')
+        time = float(samples.times[n])
+        if n not in unreachable:
+            self.violations.append(Violation(time, OUT_OF_RANGE, f': {OUT_OF_RANGE}'))
+            return
+        missing = missing_distances(self._parameters.structure, samples.motions[unreachable])
+        worst = int(np.argmax(missing.max(axis=1)))
+        if missing[worst].max() > self.missing:
+            self.missing = float(missing[worst].max())
+            self.missing_time = float(samples.times[unreachable[worst]])
+            self.missing_words = unreached(self._joints, missing[worst])
+        if self.mistake is None:
+            self.mistake = pose_mistake(self._parameters, samples.motions[n], first=False)
+        self.violations.append(Violation(
+            time, UNREACHABLE, f' {unreached(self._joints, missing[0])}',
+            int(np.argmax(missing[0]))))
+
     def check_path(self, samples: Samples) -> list[int]:
-        """Check poses as ``check`` does: singularities, joints and clearance of the legs."""
+        """Check poses as ``check`` does: singularities, joints, levers, clearance of the legs."""
         self._check_singularities(samples)
         self._check_joints(samples)
-        return self._check_clearance(samples)
+        return sorted({*self._check_levers(samples), *self._check_clearance(samples)})
+
+    def _check_levers(self, samples: Samples) -> list[int]:
+        """Check levers at and between samples; return after which closer ones are needed."""
+        limit = self._kind.lever_limit
+        if not limit:
+            return []
+        times, durations = samples.times, samples.durations
+        with np.errstate(all='ignore'):  # numbers that overflow are found by ``check``
+            squares, rates = lever_squares(self._parameters.structure, samples.motions)
+            values = np.sqrt(np.maximum(squares, 0.0))
+            # a sample that a leg does not reach is one without results
+            self._check_limit(limit, np.where(squares < 0.0, np.nan, values), _of_legs(times))
+            self._keep_smallest_lever(values, _of_legs(times))
+            cubics = Cubics.between(squares, rates, durations[:, None])
+            low, _ = cubics.bounds()
+            threshold = self._limits.thresholds[limit]
+            suspect = np.flatnonzero(samples.near & (
+                (low < threshold ** 2) | (low < self.lever ** 2)).any(axis=1))
+            begin, duration = times[suspect, None], durations[suspect, None]
+            cubics, unclear = cubics.selected(suspect), np.zeros(len(suspect), dtype=bool)
+            for fraction in cubics.extrema():
+                squares, at = cubics.at(fraction), begin + fraction * duration
+                values = np.sqrt(np.maximum(squares, 0.0))
+                self._check_limit(limit, values, at)
+                self._keep_smallest_lever(values, at)
+                self._note_lost(squares, threshold, at)
+                unclear |= (squares < 0.0).any(axis=1)
+        found: list[int] = suspect[unclear].tolist()
+        return found
+
+    def _keep_smallest_lever(self, values: Array, times: Array) -> None:
+        if np.isfinite(values).any():
+            n, leg = map(int, np.unravel_index(np.nanargmin(values), values.shape))
+            if values[n, leg] < self.lever:
+                self.lever, self.lever_time = float(values[n, leg]), float(times[n, leg])
+                self.lever_leg = leg
+
+    def _note_lost(self, squares: Array, threshold: Array, times: Array) -> None:
+        """Note legs that do not reach between samples, where their levers have no limit."""
+        lost = (squares < 0.0) & ~(threshold > 0.0)
+        if lost.any():
+            n, leg = map(int, np.unravel_index(
+                np.argmin(np.where(lost, times, np.inf)), lost.shape))
+            self.violations.append(Violation(
+                float(times[n, leg]), UNREACHABLE, f' {self._joints[leg]} cannot reach', leg))
 
     def _check_joints(self, samples: Samples) -> None:
         """Check the angles of the joints at samples, and between those that are near."""
@@ -190,8 +267,9 @@ class Checks:
         """Return after which samples a drive reverses while its motor may be at its limit."""
         p, ratio = self._parameters, motor_ratio(self._parameters)
         rates = rows[:, SPEEDS] / ratio
-        inertial = p.actuator.reflected_mass / ratio * rows[:, ACCELERATIONS_OF_MOTORS]
-        highest = (np.abs(inertial) + (np.abs(samples.results[:, FORCES] - inertial)
+        inertial = p[self._kind.fields['reflected_mass']] / ratio * rows[
+            :, ACCELERATIONS_OF_MOTORS]
+        highest = (np.abs(inertial) + (np.abs(samples.results[:, self._efforts] - inertial)
                                        + self._friction.largest_change)
                    / p.drive.efficiency) / ratio
         may = exceeds(np.maximum(highest[:-1], highest[1:]), np.minimum(
@@ -234,8 +312,10 @@ class Checks:
 
     def no_pose(self, time: float) -> None:
         """Note that no pose on this side of singularities has the lengths of the legs."""
+        dead_centre = ' or dead centre' if self._kind.lever_limit else ''
         self.violations.append(Violation(
-            time, SINGULAR, ": the legs' cubics lead to no pose on this side of a singularity"))
+            time, SINGULAR, ": the legs' cubics lead to no pose on this side of a singularity"
+            f'{dead_centre}'))
 
     def _keep_largest_force(self, forces: Array) -> None:
         magnitudes = np.abs(forces)
@@ -255,7 +335,7 @@ class Checks:
     def _reversals(self, samples: Samples) -> list[int]:
         """Return after which samples a change of Coulomb friction may add to the largest force."""
         results, durations = samples.results, samples.durations
-        forces = np.abs(results[:, FORCES])
+        forces = np.abs(results[:, self._efforts])
         which = np.flatnonzero(samples.near & self._exceed_known(
             np.maximum(forces[:-1], forces[1:]) + self._friction.largest_change))
         if not len(which) or not self._friction.coulomb.any():
@@ -268,7 +348,7 @@ class Checks:
             rate_there * durations[which, None]).middle_rate() / durations[which, None]
         of_rates = np.stack([self._friction.without_viscous.forces(rates)
                              for rates in (rate_here, rate_there, middle)])
-        others = here[:, FORCES] - of_rates[0], there[:, FORCES] - of_rates[1]
+        others = here[:, self._efforts] - of_rates[0], there[:, self._efforts] - of_rates[1]
         highest = np.maximum(*others) + of_rates.max(axis=0)
         lowest = np.minimum(*others) + of_rates.min(axis=0)
         unclear: list[int] = which[
@@ -276,9 +356,9 @@ class Checks:
         return unclear
 
     def _of_drives(self, motions: Array, results: Array) -> tuple[Array, Array]:
-        """Return coordinates and rates of the drives (N, 6) [m, m/s], but for a constant."""
+        """Return coordinates and rates of the drives (N, 6), but for a constant."""
         if self._drives is None:
-            return results[:, LENGTHS], results[:, RATES]
+            return results[:, self._kind.position.columns], results[:, self._kind.rate.columns]
         rows, ratio = self._drives(motions, results), motor_ratio(self._parameters)
         return rows[:, ANGLES_OF_MOTORS] / ratio, rows[:, SPEEDS] / ratio
 
@@ -302,15 +382,19 @@ class Checks:
             float(times[n, leg]), LIMIT, f' {exceedance.words(self._joints)}', leg, limit))
 
     def _check_cubics(self, samples: Samples) -> None:
-        """Check lengths and rates between the samples."""
+        """Check positions and rates of the drives between the samples."""
         times, durations, results = samples.times, samples.durations, samples.results
-        cubics = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
+        kind = self._kind
+        cubics = Cubics.between(results[:, kind.position.columns], results[:, kind.rate.columns],
+                                durations[:, None])
+        if np.isfinite(kind.period):
+            cubics = self._without_jumps(samples, cubics)
         # Most are within the bounds of their control points, and those within the limits.
         low, high = cubics.bounds()
         with np.errstate(all='ignore'):  # samples that are not joined may be of the same time
             middle = np.abs(cubics.middle_rate() / durations[:, None])
         shortest, longest, fastest = (
-            self._limits.thresholds[name] for name in (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX))
+            self._limits.thresholds[name] for name in (*kind.position_limits, kind.rate_limit))
         suspect = np.flatnonzero(samples.joined & (
             (low < shortest) | (high > longest) | (middle > fastest)).any(axis=1))
         if not len(suspect):
@@ -318,12 +402,28 @@ class Checks:
         begin, duration = times[suspect, None], durations[suspect, None]
         cubics = cubics.selected(suspect)
         for fraction in cubics.extrema():
-            lengths = cubics.at(fraction)
-            for limit in (LENGTH_MIN, LENGTH_MAX):
-                self._check_limit(limit, lengths, begin + fraction * duration)
+            positions = cubics.at(fraction)
+            for limit in kind.position_limits:
+                self._check_limit(limit, positions, begin + fraction * duration)
         fraction = cubics.rate_extremum()
         self._check_limit(
-            VELOCITY_MAX, cubics.rate_at(fraction) / duration, begin + fraction * duration)
+            kind.rate_limit, cubics.rate_at(fraction) / duration, begin + fraction * duration)
+
+    def _without_jumps(self, samples: Samples, cubics: Cubics) -> Cubics:
+        """Note positions that jump to the other end of a turn; return cubics without the jumps."""
+        period = self._kind.period
+        with np.errstate(invalid='ignore'):
+            turns = samples.near[:, None] * np.rint((cubics.end - cubics.start) / period)
+        if not turns.any():
+            return cubics
+        n, leg = map(int, np.argwhere(turns)[0])
+        quantity = self._kind.position
+        self.violations.append(Violation(
+            float(samples.times[n + 1]), JUMPS,
+            f' {self._joints[leg]}: {quantity.name} jumps from {cubics.start[n, leg]:.6g} to '
+            f'{cubics.end[n, leg]:.6g} {quantity.unit}, half a turn from the middle of its range',
+            leg))
+        return cubics._replace(end=cubics.end - period * turns)
 
     def _check_singularities(self, samples: Samples) -> list[int]:
         """Check samples for singularities; return after which closer ones are needed."""
@@ -360,7 +460,7 @@ class Checks:
         here, there = np.abs(results[dips]), np.abs(results[dips + 1])
         loads = np.maximum(here, there) * (smaller / lowest)[:, None]
         unclear: list[int] = dips[(lowest < DIP * smaller) | ((lowest < smaller) & (
-            (predicted >= self._stop * lowest) | self._exceed_known(loads[:, FORCES])
+            (predicted >= self._stop * lowest) | self._exceed_known(loads[:, self._efforts])
             | self._may_exceed(loads)))].tolist()
         return unclear
 

@@ -4,6 +4,8 @@
 """
 Planned trajectories: motion of the platform in, lengths, rates and forces of the legs out.
 
+With cranks these are angles, speeds and torques.
+
 A trajectory is rejected as a whole if it exceeds a limit or meets a singularity, at its points or
 between them. Both the planned motion of the platform (``interpolation``) and the motion of the
 legs under a joint_trajectory_controller are checked: the controller joins positions and velocities
@@ -16,21 +18,20 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.errors import MotionError
-from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics import (
     forward_kinematics, leg_clearance)
 from stewart_dynamics.mechanics.rows import (
-    ANGULAR_VELOCITY, consecutive, FORCES, LENGTHS, LINEAR_VELOCITY, RATES, WRENCH)
+    ANGULAR_VELOCITY, consecutive, LINEAR_VELOCITY, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.checks import Checks, Samples, Violation
 from stewart_dynamics.planned.interpolation import Cubics, Interpolation
@@ -43,7 +44,12 @@ def _no_legs() -> Array:
 
 @dataclass(frozen=True, eq=False)
 class PlannedTrajectory:
-    """The result of the check of a planned trajectory."""
+    """
+    The result of the check of a planned trajectory.
+
+    Legs of another kind have other quantities: those of telescopic legs are empty or nan for
+    cranks, and vice versa.
+    """
 
     accepted: bool
     message: str
@@ -65,6 +71,12 @@ class PlannedTrajectory:
     """At the points (N, 6) [m/s], + extends; (0, 6) where rejected."""
     forces: Array = field(default_factory=_no_legs, repr=False)
     """Actuator forces at the points (N, 6) [N], + pushes; (0, 6) where rejected."""
+    angles: Array = field(default_factory=_no_legs, repr=False)
+    """Of cranks, at the points (N, 6) [rad]; (0, 6) where rejected."""
+    speeds: Array = field(default_factory=_no_legs, repr=False)
+    """Of cranks, at the points (N, 6) [rad/s]; (0, 6) where rejected."""
+    torques: Array = field(default_factory=_no_legs, repr=False)
+    """Of cranks, at the points (N, 6) [N m], + drives the angle up; (0, 6) where rejected."""
     warning: bool = False
     """Accepted, but the condition number reaches singularity.warn_condition."""
     condition_number: float = math.nan
@@ -76,7 +88,20 @@ class PlannedTrajectory:
     force_leg: int | None = None
     """Leg of the largest force, 0 to 5."""
     load: float = math.nan
-    """The largest absolute force as a part of limits.force_max; 0 without that limit."""
+    """The largest absolute force, or torque, as a part of its limit; 0 without that limit."""
+    torque: float = math.nan
+    """The largest absolute torque of a crank, at points and between them [N m]."""
+    torque_leg: int | None = None
+    """Leg of the largest torque, 0 to 5."""
+    lever: float = math.nan
+    """
+    The smallest lever of a crank by the length of the crank, at points and between them: how near
+    the trajectory comes to a dead centre.
+    """
+    lever_time: float = math.nan
+    """Time of the smallest lever [s]."""
+    lever_leg: int | None = None
+    """Leg of the smallest lever, 0 to 5."""
 
 
 # Points and samples between them that a trajectory may need.
@@ -97,11 +122,10 @@ _PARTS = 16
 _SPEED = 2.0
 _CLOSEST = 1e-6
 
-PLANNED = 'planned trajectories'  # the name of the feature
 NOT_INCREASING = 'time_from_start is not strictly increasing'
 TOO_FAR = 'points too far apart'
 
-_LENGTHS, _RATES, _FORCES = consecutive(6, 6, 6)
+_DRIVES = consecutive(6, 6, 6)  # positions, rates and efforts
 # Index of the point before each sample in a block (M,), and fraction of the interval (M,).
 _Places = tuple[Integers, Array]
 
@@ -116,7 +140,7 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
     are those of ``inverse_dynamics``, to the last bit. Between two points the platform is taken to
     move by quintic polynomials of position and rotation vector through pose, twist and
     acceleration of both; and the legs by cubics through their lengths and rates, as
-    joint_trajectory_controller moves them. Both are checked.
+    joint_trajectory_controller moves them, or by those of angles and speeds. Both are checked.
 
     Parameters
     ----------
@@ -136,7 +160,8 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
     Returns
     -------
     PlannedTrajectory
-        Lengths, rates and forces of the legs, or the reason of the rejection.
+        Lengths, rates and forces of the legs, or angles, speeds and torques of cranks; or the
+        reason of the rejection.
 
     Raises
     ------
@@ -245,9 +270,10 @@ class _Work:
 
     def __init__(self, platform: StewartPlatform, times: Stamps, rows: Array, wrench: Array,
                  bases: Array | None, piece: int) -> None:
-        require_kind(platform.parameters, PLANNED)
         self._platform, self._times, self._motions = platform, times, rows
         self._parameters = platform.parameters
+        kind = platform.parameters.leg_kind
+        self._drives = kind.position, kind.rate, kind.effort
         self._wrench = wrench[None]
         self._bases = bases
         self._piece = piece
@@ -293,8 +319,8 @@ class _Work:
         block = slice(first, end + 1)
         motions, durations = self._motions[block], _seconds(np.diff(self._times[block]))
         results = self._solve(motions, np.arange(first, end + 1), 0.0)
-        for here, there in ((_LENGTHS, LENGTHS), (_RATES, RATES), (_FORCES, FORCES)):
-            self._legs[block, here] = results[:, there]
+        for here, of_drives in zip(_DRIVES, self._drives, strict=True):
+            self._legs[block, here] = results[:, of_drives.columns]
         with np.errstate(all='ignore'):
             between = Interpolation(durations, motions)
             parts = self._parts_between(first, durations, between, results)
@@ -302,7 +328,8 @@ class _Work:
                       else between.bounds(self._reach).speed)
         points = Samples(_seconds(self._times[block]), durations, motions, results,
                          np.ones(len(durations), dtype=bool), parts == 1.0, speeds * durations)
-        legs = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
+        positions, rates = (results[:, each.columns] for each in self._drives[:2])
+        legs = Cubics.between(positions, rates, durations[:, None])
         return _Block(first, points, between, legs, speeds), parts
 
     def _check_samples(self, block: _Block, which: Integers, fraction: Array) -> list[int]:
@@ -353,7 +380,15 @@ class _Work:
         Return the indices of samples after which the clearance needs closer samples.
         """
         legs, durations = block.legs.selected(which), block.points.durations[which, None]
-        poses, count = samples.motions.copy(), len(which)
+        # a leg has no cubic from or to a point that it does not reach
+        known = np.isfinite(legs.start).all(axis=1) & np.isfinite(legs.end).all(axis=1)
+        count = len(which) if known.all() else int(np.argmin(known))
+        if not count:
+            return []
+        if count < len(which):
+            samples, which, fraction = samples.until(count), which[:count], fraction[:count]
+            legs, durations = legs.selected(slice(count)), durations[:count]
+        poses = samples.motions.copy()
         codes, steps = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
         hexapod = self._platform.structure
         forward_kinematics.poses(
@@ -385,11 +420,13 @@ class _Work:
         bases = self._bases
         if bases is not None:
             bases = bases[None] if bases.ndim == 1 else bases[first:first + len(results)]
+        _, rates, efforts = (results[:, each.columns] for each in self._drives)
         largest = float(np.fmax.reduce(
-            np.abs(results[:, FORCES]), axis=None, initial=self._checks.force))
-        drive_rates = self._platform.drive_rates(
-            self._motions[first:first + len(results)], results[:, RATES])
-        parts = self._sampling.parts(durations, between, results, drive_rates, bases, largest)
+            np.abs(efforts), axis=None, initial=self._checks.force))
+        motions = self._motions[first:first + len(results)]
+        drive_rates = self._platform.drive_rates(motions, rates)
+        parts = self._sampling.parts(
+            durations, between, motions, results, drive_rates, bases, largest)
         if not (bounded := parts <= MOST_SAMPLES).all():
             n = first + int(np.argmin(bounded))
             raise self._too_far(f'{TOO_FAR}: points[{n}] and the next: more', n)
@@ -416,19 +453,33 @@ class _Work:
             message += (f', condition number {checks.condition_number:.4g} at '
                         f'{checks.condition_time:.3f} s is not below '
                         f'singularity.warn_condition, {warn:g}')
+        found: dict[str, Any] = {
+            of_drives.field: self._legs[:, here]
+            for here, of_drives in zip(_DRIVES, self._drives, strict=True)}
+        effort = self._parameters.leg_kind.effort.name
+        found |= {effort: checks.force, f'{effort}_leg': checks.force_leg}
+        if math.isfinite(checks.lever):
+            joint = self._parameters.joints[checks.lever_leg]
+            message += (f', smallest lever {checks.lever:.4g} of its largest: {joint} at '
+                        f'{checks.lever_time:.3f} s')
+            found |= {'lever': checks.lever, 'lever_time': checks.lever_time,
+                      'lever_leg': checks.lever_leg}
         return PlannedTrajectory(
-            True, message, points, self._duration,
-            lengths=self._legs[:, _LENGTHS], rates=self._legs[:, _RATES],
-            forces=self._legs[:, _FORCES], warning=warning,
+            True, message, points, self._duration, warning=warning,
             condition_number=checks.condition_number, condition_time=checks.condition_time,
-            force=checks.force, force_leg=checks.force_leg, load=checks.load)
+            load=checks.load, **found)
 
     def rejected(self, violation: Violation) -> PlannedTrajectory:
         """Return the result of a trajectory with a violation."""
         when = '' if violation.reason == TOO_FAR else f'at {violation.time:.3f} s'
-        mistake = f'; {self._checks.mistake}' if self._checks.mistake else ''
+        checks = self._checks
+        # a leg meets the limit of its lever, or another one, before it cannot reach
+        more = (f'; at {checks.missing_time:.3f} s {checks.missing_words}'
+                if checks.missing_words and checks.missing_time != violation.time else '')
+        if checks.mistake:
+            more += f'; {checks.mistake}'
         return PlannedTrajectory(
-            False, f'rejected: {when}{violation.words}{mistake}', len(self._times), self._duration,
+            False, f'rejected: {when}{violation.words}{more}', len(self._times), self._duration,
             violation.reason, violation.time, violation.leg, violation.limit)
 
     @property

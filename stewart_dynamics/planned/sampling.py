@@ -6,11 +6,13 @@ The number of samples between two points of a planned trajectory.
 
 Enough that neither the largest force nor a length or rate past a limit is missed by more than
 1 %. Between two samples, a quantity q(u), u from 0 to 1 between the points, deviates from the
-straight line by at most |q''| / (8 n^2) if the interval has n parts. Lengths, rates and forces of
-the legs are bounded so from those at the points and from the derivatives of the platform's motion,
-with the inertia of the platform and its legs, the reflected masses and the friction of the
-actuators. An interval whose bounds stay below the limits and below the largest force that is
-already known needs no samples.
+straight line by at most |q''| / (8 n^2) if the interval has n parts. Positions, rates and efforts
+of the drives are bounded so from those at the points and from the derivatives of the platform's
+motion, with the inertia of the platform and its legs, the reflected masses and the friction of the
+actuators. An interval whose bounds stay below the limits and below the largest effort that is
+already known needs no samples. For telescopic legs these are lengths, rates and forces.
+
+Where levers change, samples are so close that none does by more than a part of itself.
 """
 
 from __future__ import annotations
@@ -18,20 +20,27 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.legs.kind import IntervalBounds
+from stewart_dynamics.mechanics.batch import lever_squares
 from stewart_dynamics.mechanics.drives.motor_limits import force_limits, rate_limits
 from stewart_dynamics.mechanics.dynamics.friction import Friction
-from stewart_dynamics.mechanics.limits import (
-    FORCE_MAX, JOINT_FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, VELOCITY_MAX)
-from stewart_dynamics.mechanics.rows import (
-    BASE_ANGULAR_VELOCITY, CONDITION, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
+from stewart_dynamics.mechanics.limits import LIMITS, Limits
+from stewart_dynamics.mechanics.rows import BASE_ANGULAR_VELOCITY, CONDITION, UNIT_LOAD_FORCES
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.interpolation import Bounds, Interpolation
 
-# Relative, of the largest force and of limits.force_max.
+# Relative, of the largest effort and of its limit.
 TOLERANCE = 0.005
 # Between two samples, a point of the platform at the characteristic length from its origin moves
 # by at most this part of that length.
 _STEP = 0.01
+# Between two samples a lever changes by at most about this part of itself.
+_OF_LEVER = 0.15
+# Bounds of levers come nearer than this part to the smaller lever at both ends of a part of an
+# interval; the number of parts of a part that does not, and how often it is divided.
+_NEAR, _DIVIDED, _DEPTH = 0.5, 8, 5
+_MOST_DIVIDED = 4096  # parts that are looked at together; more than intervals need in practice
+_BELOW = 0.09  # square of a lever that is far from a dead centre
 # At nearly one pose, forces are polynomials of at most 8th degree of time between two points: by
 # Markov's inequality this number of parts finds their largest value to 1 %.
 _ENOUGH = 64
@@ -46,7 +55,7 @@ class Sampling:
     """
     The number of samples that the trajectories of a hexapod need.
 
-    tolerance: part of the largest force and of a limit by which a force may be missed.
+    tolerance: part of the largest effort and of a limit by which an effort may be missed.
     """
 
     def __init__(self, parameters: Parameters, tolerance: float = TOLERANCE) -> None:
@@ -54,10 +63,9 @@ class Sampling:
         self._arm = arm = parameters.singularity.characteristic_length
         self._limits = Limits(parameters)
         self._friction = Friction.of(parameters)
-        self._reflected = parameters.actuator.reflected_mass
-        self._parameters = parameters
-        # Rates above which a leg or its motor may exceed a limit.
-        self._fastest = self._limits.thresholds[VELOCITY_MAX]
+        self._parameters, self._kind = parameters, parameters.leg_kind
+        # Rates above which a drive or its motor may exceed a limit.
+        self._fastest = self._limits.thresholds[self._kind.rate_limit]
         if parameters.drives:
             self._fastest = np.minimum(self._fastest, rate_limits(parameters))
         # Largest speed of a platform joint at a speed |v| + arm |w| of the platform.
@@ -68,68 +76,108 @@ class Sampling:
         xx, _, _, yy, _, zz = parameters.carried.inertia
         self._platform_mass = (parameters.carried.mass * (1.0 + offset) ** 2
                                + float(xx + yy + zz) / arm ** 2)
-        self._piston_mass = parameters.legs.piston.mass
-        self._piston_center = parameters.legs.piston.center_of_mass
-        cylinder_center = parameters.legs.cylinder.center_of_mass
-        self._joint_inertia = (
-            parameters.legs.cylinder.mass * cylinder_center ** 2
-            + parameters.legs.cylinder.inertia + parameters.legs.piston.inertia)
 
-    def parts(self, durations: Array, between: Interpolation, results: Array,
+    def parts(self, durations: Array, between: Interpolation, motions: Array, results: Array,
               drive_rates: Array, bases: Array | None, largest: float) -> Array:
         """
         Return the number of parts in which each of N intervals is sampled (N,).
 
-        durations, between, results (N,), Interpolation, (N + 1, RESULT): durations of the
-            intervals [s], motion in them, and results at the points.
-        drive_rates (N + 1, 6): rates of the drives at the points [m/s].
+        durations, between (N,), Interpolation: durations of the intervals [s], motion in them.
+        motions, results (N + 1, MOTION), (N + 1, RESULT): rows of motion, and results, at the
+            points.
+        drive_rates (N + 1, 6): rates of the drives at the points [m/s] or [rad/s].
         bases (N + 1, BASE) or (1, BASE): rows of the base's motion at the points; the base is at
             rest by default.
-        largest: absolute force that is known to occur in the trajectory [N].
+        largest: absolute effort that is known to occur in the trajectory [N] or [N m].
         """
         bounds = between.bounds(self._arm)
+        squares = self._squares_of_levers(durations, bounds, between, motions)
+        legs = self._kind.bound_intervals(
+            self._parameters, results, np.abs(squares), self._lever)
         # Accelerations of the joints and along the legs due to speed.
-        inverse_radius = 1.0 / self._arm + 1.0 / _smaller(results[:, LENGTHS]).min(axis=1)
-        steps = bounds.path / (_STEP * self._arm)
+        inverse_radius = 1.0 / self._arm + legs.bends
+        steps = np.maximum(bounds.path / (_STEP * self._arm),
+                           bounds.path * legs.turning / _OF_LEVER)
         forces = self._force_parts(
-            durations, bounds, inverse_radius, results, drive_rates, bases, largest)
-        cubics = self._may_exceed_limits(durations, bounds, inverse_radius, results)
+            durations, bounds, legs, inverse_radius, results, drive_rates, bases, largest)
+        cubics = self._may_exceed_limits(
+            durations, bounds, legs, inverse_radius, results, squares)
         parts: Array = np.maximum(np.maximum(np.ceil(steps), forces),
                                   np.where(cubics, float(_FEWEST), 1.0))
         return parts
 
-    def _may_exceed_limits(self, durations: Array, bounds: Bounds, inverse_radius: Array,
-                           results: Array) -> Flags:
-        """Return in which intervals a length or a rate may exceed its limit (N,)."""
-        square = durations ** 2 / 8.0
-        length = bounds.position_deviation + square * bounds.speed ** 2 * inverse_radius
-        shortest, longest = (
-            self._limits.thresholds[name] for name in (LENGTH_MIN, LENGTH_MAX))
-        lengths, length_deviation = results[:, LENGTHS], self._lever * length[:, None]
+    def _squares_of_levers(self, durations: Array, bounds: Bounds, between: Interpolation,
+                           motions: Array) -> Array:
+        """
+        Return lower bounds (N, 6) of the squares of levers, by their largest ones.
+
+        Minus _BELOW where a lever certainly is below its limit: no fine samples are needed then.
+        """
+        kind, p, found = self._kind, self._parameters, np.ones((len(durations), 6))
+        if not kind.lever_limit:
+            return found
+        limit = self._limits.thresholds[kind.lever_limit] ** 2
+        which, begin = np.arange(len(durations)), np.zeros(len(durations))
+        rows, ends, ways = motions[:-1], motions[1:], bounds.path
+        for depth in range(_DEPTH + 1):
+            width = _DIVIDED ** -float(depth)
+            if depth:
+                rows, ends = between.at(which, begin), between.at(which, begin + width)
+                ways = bounds.speed[which] * durations[which] * width
+            least = kind.least_levers(p, rows, ends, ways[:, None] * self._lever)
+            smaller = np.minimum(*(lever_squares(p.structure, each)[0] for each in (rows, ends)))
+            low = smaller < limit
+            divided = (least < _NEAR ** 2 * smaller).any(axis=1) & (depth < _DEPTH)
+            np.minimum.at(found, which[~divided], np.maximum(least[~divided], 0.0))
+            np.minimum.at(found, which, np.where(low, -_BELOW, 1.0))
+            divided &= (found[which] >= 0.0).all(axis=1)
+            if not divided.any():
+                break
+            if _DIVIDED * np.count_nonzero(divided) > max(_MOST_DIVIDED, 2 * len(durations)):
+                np.minimum.at(found, which[divided], np.maximum(least[divided], 0.0))
+                break
+            parts = np.arange(_DIVIDED) * width / _DIVIDED
+            which, begin = np.repeat(which[divided], _DIVIDED), (
+                begin[divided, None] + parts).ravel()
+        return found
+
+    def _may_exceed_limits(self, durations: Array, bounds: Bounds, legs: IntervalBounds,
+                           inverse_radius: Array, results: Array, squares: Array) -> Flags:
+        """Return in which intervals a position, a rate or a lever may exceed its limit (N,)."""
+        kind, square = self._kind, durations ** 2 / 8.0
+        way = bounds.position_deviation + square * bounds.speed ** 2 * inverse_radius
+        least, most = (self._limits.thresholds[name] for name in kind.position_limits)
+        positions = results[:, kind.position.columns]
+        deviation = legs.gains * (self._lever * way[:, None])
         exceeding: Flags = (
-            (_smaller(lengths) - length_deviation < shortest)
-            | (_larger(lengths) + length_deviation > longest)
-            | (_larger(np.abs(results[:, RATES])) + self._rate_deviation(
-                durations, bounds, inverse_radius) > self._fastest)).any(axis=1)
+            (_smaller(positions) - deviation < least)
+            | (_larger(positions) + deviation > most)
+            | (_larger(np.abs(results[:, kind.rate.columns])) + self._rate_deviation(
+                durations, bounds, legs, inverse_radius) > self._fastest)).any(axis=1)
+        if kind.lever_limit:
+            exceeding |= (squares < self._limits.thresholds[kind.lever_limit] ** 2).any(axis=1)
         return exceeding
 
-    def _rate_deviation(self, durations: Array, bounds: Bounds, inverse_radius: Array) -> Array:
-        """Return how far rates of the legs may be from the straight line (N, 6) [m/s]."""
+    def _rate_deviation(self, durations: Array, bounds: Bounds, legs: IntervalBounds,
+                        inverse_radius: Array) -> Array:
+        """Return how far rates of the drives may be from the straight line (N, 6)."""
         speed = bounds.speed * inverse_radius
         turning = 3.0 * speed * bounds.acceleration + speed ** 2 * bounds.speed
-        deviation: Array = self._lever * (
-            bounds.velocity_deviation + durations ** 2 / 8.0 * turning)[:, None]
+        deviation: Array = legs.gains * (self._lever * (
+            bounds.velocity_deviation + durations ** 2 / 8.0 * turning)[:, None])
         return deviation
 
-    def _force_parts(self, durations: Array, bounds: Bounds, inverse_radius: Array,
-                     results: Array, rates: Array, bases: Array | None, largest: float) -> Array:
-        """Return the number of parts that the forces need (N,)."""
-        magnitudes = np.abs(results[:, FORCES])
-        rate_deviation = self._rate_deviation(durations, bounds, inverse_radius)
+    def _force_parts(self, durations: Array, bounds: Bounds, legs: IntervalBounds,
+                     inverse_radius: Array, results: Array, rates: Array, bases: Array | None,
+                     largest: float) -> Array:
+        """Return the number of parts that the efforts need (N,)."""
+        effort_max = self._kind.effort_limit
+        magnitudes = np.abs(results[:, self._kind.effort.columns])
+        rate_deviation = self._rate_deviation(durations, bounds, legs, inverse_radius)
         acceleration = self._acceleration_deviation(
-            durations, bounds, inverse_radius, results, bases)[:, None]
-        gains = self._gains(results)
-        deviation = self._friction.viscous * rate_deviation + gains[FORCE_MAX] * acceleration
+            durations, bounds, legs, inverse_radius, results, bases)[:, None]
+        gains = self._gains(legs, results)
+        deviation = self._friction.viscous * rate_deviation + gains[effort_max] * acceleration
         # Coulomb friction changes where a rate is, or may come, near zero.
         changes = (_smaller(np.abs(rates)) - rate_deviation < self._friction.coulomb_velocity) | (
             rates[:-1] * rates[1:] < 0.0)
@@ -145,28 +193,27 @@ class Sampling:
         allowed = self._tolerance * np.minimum(largest, strongest)
         parts = _parts(magnitudes, deviation, friction, np.minimum(largest, strongest), allowed)
         for name in self._limits.of_loads:
-            if name != FORCE_MAX:
+            if name != effort_max:
                 bound = self._limits.bounds[name]
                 parts = np.maximum(parts, _parts(
                     np.abs(results[:, LIMITS[name].columns]), gains[name] * acceleration, 0.0,
                     bound, self._tolerance * bound))
         return parts
 
-    def _gains(self, results: Array) -> dict[str, Array]:
+    def _gains(self, legs: IntervalBounds, results: Array) -> dict[str, Array]:
         """
         Return bounds of loads (N, 6) for an acceleration |a| + arm |alpha| of the platform of 1.
 
         For all masses that move with it, by the name of the limit of each load.
         """
-        length = _smaller(results[:, LENGTHS])
-        legs = self._piston_mass + (self._joint_inertia + self._piston_mass * (
-            _larger(results[:, LENGTHS]) - self._piston_center) ** 2) / length ** 2
-        mass = self._platform_mass + (legs * self._lever ** 2).sum(axis=1)
+        mass = self._platform_mass + (legs.masses * self._lever ** 2).sum(axis=1)
         joints: Array = _larger(results[:, UNIT_LOAD_FORCES]) * mass[:, None]
-        return {FORCE_MAX: joints + self._reflected * self._lever, JOINT_FORCE_MAX: joints}
+        return {self._kind.effort_limit: legs.pushes * joints + legs.efforts * self._lever,
+                self._kind.joint_force_limit: joints + legs.ends * self._lever}
 
-    def _acceleration_deviation(self, durations: Array, bounds: Bounds, inverse_radius: Array,
-                                results: Array, bases: Array | None) -> Array:
+    def _acceleration_deviation(self, durations: Array, bounds: Bounds, legs: IntervalBounds,
+                                inverse_radius: Array, results: Array, bases: Array | None,
+                                ) -> Array:
         """Return how far accelerations of masses may be from the straight line (N,) [m/s^2]."""
         # Beside the acceleration's own: speeds that change the directions, a pose that changes
         # what a changing acceleration asks for, and a base that turns.
@@ -176,7 +223,8 @@ class Sampling:
         acceleration = bounds.acceleration_deviation + 0.25 * (
             inverse_radius * ((bounds.acceleration * h) ** 2
                               + 8.0 * speed * bounds.velocity_deviation)
-            + np.minimum(condition * bounds.path / self._arm, 1.0) * changing)
+            + np.minimum(condition * bounds.path / self._arm + legs.turning * bounds.path, 1.0)
+            * changing)
         if bases is not None:
             turning = np.sqrt((bases[:, BASE_ANGULAR_VELOCITY] ** 2).sum(axis=1))
             turning = np.nan_to_num(_larger(turning) if len(turning) > 1 else turning)

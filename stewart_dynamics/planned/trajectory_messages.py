@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND, Six, Stamps
-from stewart_dynamics.errors import MotionError, ParameterError
-from stewart_dynamics.legs import require_kind
+from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.base_motion import row_of_motion
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, quaternion_length
 from stewart_dynamics.mechanics.rows import (
-    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, consecutive, LENGTHS, LINEAR_ACCELERATION,
-    MOTION, POSE, POSITION, ROTATION)
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, consecutive, LINEAR_ACCELERATION, MOTION,
+    POSE, POSITION, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError
@@ -33,7 +32,7 @@ from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters
 from stewart_dynamics.parameters.tolerances import is_unit, START_TOLERANCE, unit_rule
 from stewart_dynamics.planned.approach import approach_in_pieces, MOST_POINTS
 from stewart_dynamics.planned.planned_trajectory import (
-    check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PLANNED, PlannedTrajectory)
+    check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
 from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
 
@@ -48,7 +47,6 @@ QUEUE_FULL = 'queue full'
 NOT_MEASURED = 'measured legs not known'
 STARTS_ELSEWHERE = 'does not start where the legs are'
 NO_APPROACH = 'no approach to the first point'
-NOT_AVAILABLE = 'not available for these legs'
 
 _POSITION, _QUATERNION, _TWIST_AND_ACCELERATION = consecutive(3, 4, 12)
 
@@ -88,11 +86,6 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
         known; at rest by default.
     measured (MOTION,): a row of motion of the platform as measured, for ``trajectory.approach``.
     """
-    try:
-        require_kind(parameters, PLANNED)
-    except ParameterError as exc:
-        yield rejected(NOT_AVAILABLE, str(exc))
-        return
     platform = StewartPlatform(parameters)
     try:
         message = _checked_header(data, parameters.base_frame)
@@ -185,16 +178,17 @@ def _from_measured(platform: StewartPlatform, times: Stamps, rows: Array, wrench
         raise _NotCheckableError(NOT_MEASURED, 'trajectory.approach needs ~/measured_legs')
     start = np.zeros(MOTION)
     start[POSE] = measured[POSE]
-    lengths = platform.solve(np.stack([start, rows[0]]))[:, LENGTHS]
-    away = np.abs(lengths[1] - lengths[0])
-    tolerance = START_TOLERANCE * p.singularity.characteristic_length
-    if away.max() <= tolerance:
-        return times, rows, bases
-    leg = int(np.argmax(away))
+    quantity = p.leg_kind.position
+    positions = platform.solve(np.stack([start, rows[0]]))[:, quantity.columns]
+    away = np.abs(positions[1] - positions[0])
+    tolerances = START_TOLERANCE * p.singularity.characteristic_length / p.leg_kind.reach(p)
+    if np.isnan(away).any() or (away <= tolerances).all():
+        return times, rows, bases  # the check rejects a point that a leg does not reach
+    leg = int(np.argmax(away / tolerances))
     if p.trajectory.approach == CHECK:
         raise _NotCheckableError(
-            STARTS_ELSEWHERE, f'{p.joints[leg]} is {away[leg]:.4g} m from its first length, '
-            f'more than {tolerance:.4g} m')
+            STARTS_ELSEWHERE, f'{p.joints[leg]} is {away[leg]:.4g} {quantity.unit} from its first '
+            f'{quantity.name}, more than {tolerances[leg]:.4g} {quantity.unit}')
     first = bases if bases is None or bases.ndim == 1 else bases[0]
     found = None
     try:
@@ -253,13 +247,14 @@ def _unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
 def _written(parameters: Parameters, stamp: int, times: Stamps, result: PlannedTrajectory,
              ) -> Generator[None, None, bytes]:
     """Return the trajectory_msgs/JointTrajectory of an accepted trajectory."""
+    kind = parameters.leg_kind
     answer = LegTrajectory(
         stamp, parameters.joints, result.points, parameters.trajectory.effort)
     for first in range(0, result.points, _WRITTEN):
         some = slice(first, min(first + _WRITTEN, result.points))
-        answer.put(
-            first, times[some], result.lengths[some] - parameters.geometry.zero_length,
-            result.rates[some], result.forces[some])
+        positions, rates, efforts = (getattr(result, each.field)[some] for each in (
+            kind.position, kind.rate, kind.effort))
+        answer.put(first, times[some], positions - parameters.geometry.zero_length, rates, efforts)
         yield
     return answer.message()
 
@@ -267,14 +262,19 @@ def _written(parameters: Parameters, stamp: int, times: Stamps, result: PlannedT
 def _values(parameters: Parameters, result: PlannedTrajectory) -> tuple[tuple[str, str], ...]:
     """Return the keys and values for diagnostics."""
     values = [('points', str(result.points)), ('duration (s)', f'{result.duration:.9g}')]
-    joints = parameters.joints
-    if result.accepted and result.force_leg is not None:
+    joints, kind = parameters.joints, parameters.leg_kind
+    effort = kind.effort.name
+    leg: int | None = getattr(result, f'{effort}_leg')
+    if result.accepted and leg is not None:
         values += [('worst condition number', f'{result.condition_number:.6g}'),
                    ('its time (s)', f'{result.condition_time:.3f}'),
-                   ('largest force (N)', f'{result.force:.6g}'),
-                   ('its leg', joints[result.force_leg])]
-        if parameters.limits.force_max is not None:
-            values.append(('largest force, of limits.force_max', f'{result.load:.4g}'))
+                   (f'largest {effort} ({kind.effort.unit})', f'{getattr(result, effort):.6g}'),
+                   ('its leg', joints[leg])]
+        if parameters[kind.effort_limit] is not None:
+            values.append((f'largest {effort}, of {kind.effort_limit}', f'{result.load:.4g}'))
+        if result.lever_leg is not None:
+            values += [('smallest lever, of its largest', f'{result.lever:.4g}'),
+                       ('leg of the smallest lever', joints[result.lever_leg])]
     elif not np.isnan(result.time):
         values.append(('rejected at (s)', f'{result.time:.6g}'))
         if result.leg is not None:

@@ -16,10 +16,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.frames.motion import listed, Motion, Pose
-from stewart_dynamics.mechanics.limits import USUAL
+from stewart_dynamics.mechanics.limits import limits_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
@@ -108,8 +107,8 @@ def _amplitudes_within(path: str, initial: tuple[float, ...], highest: int, peri
     from stewart_dynamics.capability.capability import Capability  # slow, other motions need none
 
     platform = StewartPlatform(Parameters.from_yaml(path))
-    require_kind(platform.parameters, 'motion response within limits')
-    if missing := [name for name in USUAL if platform.parameters[name] is None]:
+    if missing := [name for name in limits_of(platform.parameters).usual
+                   if platform.parameters[name] is None]:
         raise ParameterError(f'{path}: {", ".join(missing)}: missing: the motion response needs '
                              'them, or motion.amplitude in place of motion.response.params_file')
     capability = Capability(platform)

@@ -144,6 +144,7 @@ def _far(parameters: Parameters, position: Array, rotation: Array) -> str:
 
 
 def _legs(parameters: Parameters, position: Array, rotation: Array) -> tuple[Array, float]:
-    """Return the lengths of the legs (6,) [m], and det(J) [m^3]."""
-    legs = lagrange.unchecked_legs(parameters, position, rotation)
-    return legs.lengths, float(lagrange.determinant(legs))
+    """Return the lengths of the legs (6,) [m], and det(J) [m^3]; not finite out of reach."""
+    with np.errstate(all='ignore'):
+        legs = lagrange.unchecked_legs(parameters, position, rotation)
+        return legs.lengths, float(lagrange.determinant(legs))
