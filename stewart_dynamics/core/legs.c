@@ -61,8 +61,8 @@ typedef struct { double value, rate; } lever_square;
 
 /* Of a kind of legs, for the library:
    position: that of the drive, nan where it does not reach. drive_row: the row of J_q, with moments
-   times per_size. measured: in a motion. square: of the lever. anchor_rate: of the end of the line that
-   is not at the platform. mass, columns: see the structures.
+   times per_size. measured: in a motion. square: of the lever. anchor_rate: of the end of
+   the line that is not at the platform. mass, columns: see the structures.
    momentum_rate: of the leg's momentum, and of its moment of momentum about the base's origin. */
 #define STEWART_LIBRARY
 #include "telescopic.h"
