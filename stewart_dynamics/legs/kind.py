@@ -67,6 +67,19 @@ class StopLoads(NamedTuple):
     at_joints: Array
 
 
+# Violation of the triangle inequality by principal moments rounded to two or three digits.
+_ROUNDING = 0.02
+
+
+def impossible_inertia(name: str, moments: Array, order: str = 'ixx ixy ixz iyy iyz izz',
+                       ) -> Iterator[str]:
+    """Yield that no body has these principal moments (3,), in ascending order."""
+    if moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
+        listed = ', '.join(f'{each:.3g}' for each in moments)
+        yield (f'{name}: principal moments [{listed}] kg m^2: no body has one '
+               f'larger than the sum of the other two: is the order {order}?')
+
+
 class Solid(NamedTuple):
     """A cylinder of each leg, as pictures show it."""
 
@@ -159,6 +172,8 @@ class LegKind(ABC):
         Values of parameters that let the assembly of the legs follow from the other ones.
     zero : str
         The parameter by which the zero of the drive is chosen; empty: its joint has that zero.
+    anchors_are : str
+        Where the lines of force begin, in words.
 
     """
 
@@ -199,6 +214,7 @@ class LegKind(ABC):
     elements: tuple[str, ...]
     shortened: tuple[str, ...] = ()
     zero: str = ''
+    anchors_are: str = 'base joints'
     likely: Mapping[str, Any] = {}
     inertia_unit: str  # of the reflected inertia of a drive
     reflected: str  # what it is, in a formula
