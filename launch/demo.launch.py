@@ -6,12 +6,16 @@
 Start reference motion, node, simulator and an example controller, in real time.
 
     ros2 launch stewart_dynamics demo.launch.py feed_forward:=false payload_factor:=1.3
+    ros2 launch stewart_dynamics demo.launch.py params_file:=config/crank_platform.yaml
+        trajectory_file:=config/trajectory_cranks.yaml
 """
 
 import math
+import os
 import sys
 from typing import Any
 
+from ament_index_python.packages import get_package_share_directory
 from launch import Action, LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, Shutdown
 from launch.conditions import IfCondition
@@ -21,6 +25,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reference_motion.motion_functions import first_pose
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.launch_arguments import check_files, check_launch_arguments
 from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
@@ -31,7 +36,7 @@ FILES = {
                         'YAML file with the parameters of the reference motion'),
     'simulator_file': ('simulator.yaml', SimulatorParameters,
                        'YAML file with the parameters of the simulation; the motion must begin at '
-                       'its initial_pose')}
+                       'its initial_pose, which is where it begins with the default file')}
 
 
 def checked(context: LaunchContext) -> tuple[dict[str, str], float]:
@@ -52,6 +57,13 @@ def nodes(context: LaunchContext) -> list[Action]:
     """Return the four nodes, all in one namespace: setpoints go to stewart_dynamics/setpoint/."""
     files, factor = checked(context)
     parameters = Parameters.from_yaml(files['params_file'])
+    simulated: dict[str, Any] = {}
+    default, *_ = FILES['simulator_file']
+    share = get_package_share_directory('stewart_dynamics')
+    if os.path.samefile(files['simulator_file'], os.path.join(share, 'config', default)):
+        # A file of config/ is about platform.yaml; another hexapod and motion begin elsewhere.
+        simulated['initial_pose'] = first_pose(
+            ReferenceMotionParameters.from_yaml(files['trajectory_file'])).tolist()
     payload = {'platform.mass': factor * parameters.platform.mass,
                'platform.inertia': (factor * parameters.platform.inertia).tolist()}
     common: dict[str, Any] = {'namespace': LaunchConfiguration('namespace'), 'output': 'screen'}
@@ -65,7 +77,8 @@ def nodes(context: LaunchContext) -> list[Action]:
              parameters=[files['params_file']],
              remappings=[('~/measured_legs', 'stewart_simulator/leg_states')], **needed),
         Node(package='stewart_dynamics', executable='stewart_simulator', name='stewart_simulator',
-             parameters=[files['params_file'], files['simulator_file'], payload], **needed),
+             parameters=[files['params_file'], files['simulator_file'], simulated, payload],
+             **needed),
         # An example to copy, not an executable of the package.
         Node(executable=sys.executable, name='leg_controller',
              arguments=[PathJoinSubstitution([package, 'examples', 'leg_controller.py'])],
