@@ -20,7 +20,6 @@ from stewart_dynamics import (
     Parameters, Pose, StewartPlatform)
 from stewart_dynamics.calibration.pose_design import design_poses
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
-from stewart_dynamics.export.drive_files import drive_files
 from stewart_dynamics.export.linuxcnc import hal_lines
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import Identification
@@ -40,7 +39,7 @@ NOT_FOR_CRANKS = 'legs.crank.length: {}: available for telescopic legs alone'
 PROGRAMS = {
     'stewart_calibrate poses.csv': 'calibration', 'stewart_calibrate --design 20': 'calibration',
     'stewart_cueing_report vehicle.csv': 'motion cueing',
-    'stewart_export --fmu --drives': '--drives', 'stewart_export --linuxcnc': '--linuxcnc',
+    'stewart_export --fmu --linuxcnc': '--linuxcnc', 'stewart_export --linuxcnc': '--linuxcnc',
     'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification',
     'stewart_replay bag --response --measured /legs': 'responses'}
 NODES = {
@@ -98,7 +97,6 @@ CALLS: dict[str, Callable[[StewartPlatform], object]] = {
     'identification': lambda platform: Identification(
         platform.parameters, IdentificationOptions()),
     'identification ': lambda platform: design(platform.parameters, DesignOptions()),
-    '--drives': lambda platform: drive_files(platform.parameters, 'rig'),
     '--linuxcnc': lambda platform: hal_lines(platform.parameters),
     'responses': responses,
     'motion cueing ': lambda platform: CueingParameters(

@@ -91,6 +91,8 @@ class Crank(LegKind):
                             for each in ('length', 'mass', 'center_of_mass', 'inertia')))
     shortened = HEADINGS,
     anchors_are = 'ends of the cranks'
+    moved, moves, unit_word = 'crank', '+ drives the angle up', 'radian'
+    large_effort = 1.0, '1 N m'
     likely = {'geometry.crank_branch': (AUTO,)}
     inertia_unit = 'kg m^2'
     reflected, rotors = 'N^2 J', 'rotor and gear'

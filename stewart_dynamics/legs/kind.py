@@ -174,6 +174,14 @@ class LegKind(ABC):
         The parameter by which the zero of the drive is chosen; empty: its joint has that zero.
     anchors_are : str
         Where the lines of force begin, in words.
+    moved : str
+        The part that a drive moves: 'leg'.
+    moves : str
+        A positive position of it: '+ extends'.
+    unit_word : str
+        The unit of the position, in words.
+    large_effort : tuple
+        An effort of the usual size, and in words.
 
     """
 
@@ -215,6 +223,10 @@ class LegKind(ABC):
     shortened: tuple[str, ...] = ()
     zero: str = ''
     anchors_are: str = 'base joints'
+    moved: str
+    moves: str
+    unit_word: str
+    large_effort: tuple[float, str]
     likely: Mapping[str, Any] = {}
     inertia_unit: str  # of the reflected inertia of a drive
     reflected: str  # what it is, in a formula
