@@ -209,6 +209,9 @@ SLIPS: dict[str, tuple[str, dict[str, Any], str]] = {
     'gravity up and the platform below': (
         'hanging', {'gravity': [0.0, 0.0, 9.80665]},
         'gravity: [0, 0, 9.81] m/s^2 and geometry.platform_side: negative: each turns'),
+    'seconds for 60 degrees': (
+        'hobby', {'limits.speed_max': 0.17}, 'limits.speed_max: 0.17 rad/s: the time of a servo '
+        'for 60 degrees? 0.17 s for 60 degrees are 6.16 rad/s'),
     'torque in kg cm': ('hobby', {'limits.torque_max': 9.4},
                         'limits.torque_max: 9.4 N m: 2'),
     'a platform wider than the ends of the cranks': (

@@ -38,6 +38,8 @@ _LARGEST_GYRATION, _SMALLEST_GYRATION = 3.0, 0.01
 # Stall torque times speed times the torque by that at home, for servos of 2 to 400 kg cm: 300 to
 # 8e3 W; with kg cm taken as N m 104 times as much. Speed of a servo if it is not given.
 _LARGEST_POWER, _SERVO_SPEED = 1e4, 7.0  # [W], [rad/s]
+# Servos need 0.05 to 0.5 s for 60 degrees; none needs two.
+_SLOWEST_SERVO, _SIXTY = 0.5, math.pi / 3.0  # [rad/s], [rad]
 # Centers of mass of rods are between their joints, or a little beyond.
 _BEYOND = 0.5
 
@@ -93,6 +95,9 @@ def likely_mistakes(p: Parameters, home: AtHome, above: Array, at_home: Array, l
     fastest = p.limits.speed_max
     if fastest is not None and fastest.max() > _FASTEST:
         yield f'limits.speed_max: {fastest.max():.3g} rad/s: in degrees per second, or in rpm?'
+    elif fastest is not None and fastest.min() < _SLOWEST_SERVO and _has_servos(p):
+        yield (f'limits.speed_max: {fastest.min():.3g} rad/s: the time of a servo for 60 degrees? '
+               f'{fastest.min():.3g} s for 60 degrees are {_SIXTY / fastest.min():.3g} rad/s')
     yield from _turned_over_twice(p, home)
     signs = tuple(_branches(p, at_home, levers)) or tuple(
         _signs_and_zeros(p, home, angles, np.sign(levers)))
@@ -320,9 +325,13 @@ def _loads_at_home(p: Parameters, torques: Array, levers: Array) -> Iterator[str
                f'{pushes[at]:.3g} N while the platform is at rest at home: in kN?')
 
 
+def _has_servos(p: Parameters) -> bool:
+    return any(each.startswith('servo.') for each in p.given)
+
+
 def _torques_of_servos(p: Parameters, most: Array, torques: Array) -> Iterator[str]:
     """Yield torques that no servo has at its speed, for a platform that needs torques (6,)."""
-    if not any(each.startswith('servo.') for each in p.given):
+    if not _has_servos(p):
         return
     fastest = np.full(6, _SERVO_SPEED) if p.limits.speed_max is None else p.limits.speed_max
     powers = most * fastest * most / np.maximum(torques.max(), 1e-12)
