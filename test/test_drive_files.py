@@ -426,7 +426,7 @@ def compiled(folder: Path, header: str, functions: Mapping[str, str]) -> ctypes.
 
 
 def test_a_mock_gear_motor_turns_its_crank(tmp_path: Path) -> None:
-    """CiA 402, moteus and ODrive: angle, speed and torque of the crank, gear and sign in them."""
+    """Angle, speed, torque by CiA 402, moteus and ODrive, with gear and sign."""
     platform, texts = StewartPlatform(GEARED), drive_files(GEARED, 'rig')
     call = compiled(tmp_path, str(texts['rig_drives.h']), {
         'turns': 'double double', 'torque': 'double double', 'odrive_torque': 'double int16_t',

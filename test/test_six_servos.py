@@ -24,14 +24,14 @@ from stewart_dynamics.legs import example
 PAGE = (ROOT / 'docs' / 'six_servos.md').read_text(encoding='utf-8')
 COMMANDS = re.findall(r'^    (stewart_.*)$', PAGE, flags=re.MULTILINE)
 PARTS = re.findall(r'```python\n(.*?)```\n```text\n(.*?)```', PAGE, flags=re.DOTALL)
-# Of legs that are mirror images the last digit decides which one is named.
+# Rounding decides which of two legs that are mirror images is named.
 _LEG = re.compile(r'leg[_ ]\d')
 # Parameters of the program that are not those of the file to the last digit.
 _ROUNDED = 1e-3
 
 
 class Walk(NamedTuple):
-    """What a reader of the page has at its end."""
+    """The folder, names and output of a reader at the end of the page."""
 
     folder: Path
     names: dict[str, Any]  # of the program
@@ -60,7 +60,7 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Walk:
 
 
 def run(command: str, folder: Path) -> str:
-    """Run a command of the page, with its redirection; return what it prints."""
+    """Run a command of the page, with its redirection; return its output."""
     line, _, file = command.partition(' > ')
     program, *arguments = shlex.split(line)
     done = subprocess.run([Path(sys.executable).with_name(program), *arguments], cwd=folder,

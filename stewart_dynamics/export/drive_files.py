@@ -46,7 +46,7 @@ class Amplifier(NamedTuple):
     rated_torque: float  # 1000 per mille [N m]; nan: not CiA 402
     counts_per_turn: float
     direction: float  # 1 or -1
-    # Of a servo on a bus; nan where it is not given.
+    # Units of a servo on a bus; nan where it is not given.
     counts_at_zero: float
     speed_unit: float  # [rad/s]
     current_unit: float  # [A]

@@ -33,7 +33,7 @@ def example(name: str) -> str:
     """
     Return a commented parameter file to begin with.
 
-    Raises ParameterError: it is none of ``example_names``.
+    Raises ParameterError: the name is not in ``example_names``.
     """
     if name not in example_names():
         given = shown_name(name) if name else 'missing'
