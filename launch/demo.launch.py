@@ -15,7 +15,6 @@ import os
 import sys
 from typing import Any
 
-from ament_index_python.packages import get_package_share_directory
 from launch import Action, LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, Shutdown
 from launch.conditions import IfCondition
@@ -59,8 +58,9 @@ def nodes(context: LaunchContext) -> list[Action]:
     parameters = Parameters.from_yaml(files['params_file'])
     simulated: dict[str, Any] = {}
     default, *_ = FILES['simulator_file']
-    share = get_package_share_directory('stewart_dynamics')
-    if os.path.samefile(files['simulator_file'], os.path.join(share, 'config', default)):
+    package = FindPackageShare('stewart_dynamics')
+    if os.path.samefile(files['simulator_file'], PathJoinSubstitution(
+            [package, 'config', default]).perform(context)):
         # A file of config/ is about platform.yaml; another hexapod and motion begin elsewhere.
         simulated['initial_pose'] = first_pose(
             ReferenceMotionParameters.from_yaml(files['trajectory_file'])).tolist()
@@ -69,7 +69,6 @@ def nodes(context: LaunchContext) -> list[Action]:
     common: dict[str, Any] = {'namespace': LaunchConfiguration('namespace'), 'output': 'screen'}
     # Without one of these there is no loop; the motion may be complete.
     needed = {**common, 'on_exit': Shutdown()}
-    package = FindPackageShare('stewart_dynamics')
     return [
         LogInfo(msg=', '.join(f'{name}: {file}' for name, file in files.items())),
         # With the measured legs of the simulator the node estimates the external wrench.
