@@ -56,7 +56,9 @@ def nodes(context: LaunchContext) -> list[Action]:
     """Return the four nodes, all in one namespace: setpoints go to stewart_dynamics/setpoint/."""
     files, factor = checked(context)
     parameters = Parameters.from_yaml(files['params_file'])
-    simulated: dict[str, Any] = {}
+    simulated: dict[str, Any] = {
+        'platform.mass': factor * parameters.platform.mass,
+        'platform.inertia': (factor * parameters.platform.inertia).tolist()}
     default, *_ = FILES['simulator_file']
     package = FindPackageShare('stewart_dynamics')
     if os.path.samefile(files['simulator_file'], PathJoinSubstitution(
@@ -64,8 +66,6 @@ def nodes(context: LaunchContext) -> list[Action]:
         # A file of config/ is about platform.yaml; another hexapod and motion begin elsewhere.
         simulated['initial_pose'] = first_pose(
             ReferenceMotionParameters.from_yaml(files['trajectory_file'])).tolist()
-    payload = {'platform.mass': factor * parameters.platform.mass,
-               'platform.inertia': (factor * parameters.platform.inertia).tolist()}
     common: dict[str, Any] = {'namespace': LaunchConfiguration('namespace'), 'output': 'screen'}
     # Without one of these there is no loop; the motion may be complete.
     needed = {**common, 'on_exit': Shutdown()}
@@ -76,8 +76,7 @@ def nodes(context: LaunchContext) -> list[Action]:
              parameters=[files['params_file']],
              remappings=[('~/measured_legs', 'stewart_simulator/leg_states')], **needed),
         Node(package='stewart_dynamics', executable='stewart_simulator', name='stewart_simulator',
-             parameters=[files['params_file'], files['simulator_file'], simulated, payload],
-             **needed),
+             parameters=[files['params_file'], files['simulator_file'], simulated], **needed),
         # An example to copy, not an executable of the package.
         Node(executable=sys.executable, name='leg_controller',
              arguments=[PathJoinSubstitution([package, 'examples', 'leg_controller.py'])],
