@@ -104,6 +104,20 @@ def test_the_example_is_the_rig_that_the_program_converts(walk: Walk, tmp_path: 
     assert speed == pytest.approx(np.full(6, math.radians(60.0) / 0.17 / 2.0), rel=1e-12)
 
 
+def test_horns_that_point_away_from_each_other_are_nearly_singular_here(walk: Walk) -> None:
+    names = walk.names
+    conditions = []
+    for headings in (names['headings'], names['base'] + names['away']):
+        other = StewartPlatform(names['platform'].parameters.replaced(
+            {'geometry.crank_angles': np.remainder(headings + np.pi, 2.0 * np.pi) - np.pi}))
+        conditions.append(other.inverse_dynamics(
+            Motion.from_pose(other.home_pose())).condition_number)
+        assert (len(other.check()) == 1) == (conditions[-1] > 100.0)
+    here, there = re.findall(r'`: ([0-9.]+) here, 20 is .*? it is ([0-9]+): the', PAGE.replace(
+        '\n', ' '))[0]
+    assert (f'{conditions[0]:.1f}', f'{conditions[1]:.0f}') == (here, there)
+
+
 def test_the_faster_move_that_the_page_advises_is_possible(walk: Walk) -> None:
     names = walk.names
 
