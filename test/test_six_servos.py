@@ -138,7 +138,7 @@ def test_the_faster_move_that_the_page_advises_is_possible(walk: Walk) -> None:
 def test_pulses_of_the_table_turn_the_rods_to_their_platform_joints(walk: Walk) -> None:
     """By the horns as a protractor sees them: 45 degrees for 500 us, the second of a pair down."""
     platform: StewartPlatform = walk.names['platform']
-    rows = [line for line in walk.printed[2].splitlines()]
+    rows = walk.printed[2].splitlines()
     moves = [{}, {'x': 10}, {'y': 10}, {'z': 10}, {'z': -10}, {'roll': 5}, {'pitch': 5},
              {'yaw': 10}]
     base = np.deg2rad(np.repeat([0.0, 120.0, 240.0], 2) + np.tile([-28.0, 28.0], 3))
