@@ -212,6 +212,7 @@ setup(
                   f'{package_name}.cueing': ['templates/*'],
                   f'{package_name}.datasheet': ['templates/*'],
                   f'{package_name}.export': ['c/*'],
+                  f'{package_name}.legs': ['examples/*'],
                   f'{package_name}.identification': ['templates/*'],
                   f'{package_name}.replay': ['templates/*'],
                   f'{package_name}.reporting': ['templates/*']},

@@ -6,9 +6,12 @@
 Start reference motion, node, simulator and an example controller, in real time.
 
     ros2 launch stewart_dynamics demo.launch.py feed_forward:=false payload_factor:=1.3
+    ros2 launch stewart_dynamics demo.launch.py params_file:=config/crank_platform.yaml
+        trajectory_file:=config/trajectory_cranks.yaml
 """
 
 import math
+import os
 import sys
 from typing import Any
 
@@ -21,6 +24,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reference_motion.motion_functions import first_pose
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.launch_arguments import check_files, check_launch_arguments
 from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
@@ -31,7 +35,7 @@ FILES = {
                         'YAML file with the parameters of the reference motion'),
     'simulator_file': ('simulator.yaml', SimulatorParameters,
                        'YAML file with the parameters of the simulation; the motion must begin at '
-                       'its initial_pose')}
+                       'its initial_pose, which is where it begins with the default file')}
 
 
 def checked(context: LaunchContext) -> tuple[dict[str, str], float]:
@@ -52,12 +56,19 @@ def nodes(context: LaunchContext) -> list[Action]:
     """Return the four nodes, all in one namespace: setpoints go to stewart_dynamics/setpoint/."""
     files, factor = checked(context)
     parameters = Parameters.from_yaml(files['params_file'])
-    payload = {'platform.mass': factor * parameters.platform.mass,
-               'platform.inertia': (factor * parameters.platform.inertia).tolist()}
+    simulated: dict[str, Any] = {
+        'platform.mass': factor * parameters.platform.mass,
+        'platform.inertia': (factor * parameters.platform.inertia).tolist()}
+    default, *_ = FILES['simulator_file']
+    package = FindPackageShare('stewart_dynamics')
+    if os.path.samefile(files['simulator_file'], PathJoinSubstitution(
+            [package, 'config', default]).perform(context)):
+        # A file of config/ is about platform.yaml; another hexapod and motion begin elsewhere.
+        simulated['initial_pose'] = first_pose(
+            ReferenceMotionParameters.from_yaml(files['trajectory_file'])).tolist()
     common: dict[str, Any] = {'namespace': LaunchConfiguration('namespace'), 'output': 'screen'}
     # Without one of these there is no loop; the motion may be complete.
     needed = {**common, 'on_exit': Shutdown()}
-    package = FindPackageShare('stewart_dynamics')
     return [
         LogInfo(msg=', '.join(f'{name}: {file}' for name, file in files.items())),
         # With the measured legs of the simulator the node estimates the external wrench.
@@ -65,7 +76,7 @@ def nodes(context: LaunchContext) -> list[Action]:
              parameters=[files['params_file']],
              remappings=[('~/measured_legs', 'stewart_simulator/leg_states')], **needed),
         Node(package='stewart_dynamics', executable='stewart_simulator', name='stewart_simulator',
-             parameters=[files['params_file'], files['simulator_file'], payload], **needed),
+             parameters=[files['params_file'], files['simulator_file'], simulated], **needed),
         # An example to copy, not an executable of the package.
         Node(executable=sys.executable, name='leg_controller',
              arguments=[PathJoinSubstitution([package, 'examples', 'leg_controller.py'])],

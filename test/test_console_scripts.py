@@ -10,12 +10,14 @@ from pathlib import Path
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from referees import ROOT
 from snapshot import Snapshot
-from stewart_dynamics import StewartError
+from stewart_dynamics import StewartError, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.executables import executable
+from stewart_dynamics.legs import example, example_names, KINDS
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
@@ -59,6 +61,37 @@ def test_help_and_version_are_answered_without_ros_and_without_a_compiler() -> N
     assert run('--help', 'without ROS') == (
         ''.join(f'{usage(kind)}\n' for kind in PROGRAMS.values()) + '[0, 0, 0] []\n', [])
     assert run('--version', 'without ROS') == (f'{SOFTWARE}\n' * 3 + '[0, 0, 0] []\n', [])
+
+
+@pytest.mark.parametrize('name', example_names())
+def test_an_example_is_a_parameter_file_to_begin_with(name: str, tmp_path: Path) -> None:
+    """It is printed without ROS, read as ROS does, and has no possible error."""
+    done = subprocess.run([sys.executable, '-c', RUN, 'without ROS', f'dynamics --example {name}'],
+                          check=True, capture_output=True, text=True, timeout=300)
+    text, _, last = done.stdout.rstrip().rpartition('\n')
+    assert (f'{text}\n', last, done.stderr) == (example(name), '[0] []', '')
+    assert all(len(line) <= 99 for line in text.splitlines())
+    file = tmp_path / 'rig.yaml'
+    file.write_text(f'{text}\n')
+    parameters = Parameters.from_yaml(file)
+    platform = StewartPlatform(parameters)
+    assert platform.check() == ()
+    assert parameters.leg_kind.name.startswith(name.rstrip('s'))
+    home = platform.home_pose()
+    assert home.position[2] > 0.0 and np.abs(home.position[:2]).max() < 1e-6
+
+
+def test_each_kind_of_legs_has_an_example() -> None:
+    assert len(example_names()) == len(KINDS)
+
+
+def test_an_example_that_is_not_there_is_reported_in_one_line(snapshot: Snapshot) -> None:
+    for arguments in ('dynamics --example', 'dynamics --example delta'):
+        done = subprocess.run([sys.executable, '-c', RUN, 'without ROS', arguments],
+                              check=True, capture_output=True, text=True, timeout=300)
+        assert done.stdout == '[1] []\n'
+        line, = done.stderr.splitlines()
+        snapshot(line)
 
 
 @pytest.mark.parametrize('program', PROGRAMS)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 import pytest
 from referees import random_motion, rng, ROOT
 from snapshot import Snapshot
-from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.export import main
 from stewart_dynamics.export.drive_files import drive_files
@@ -365,3 +365,166 @@ def test_stewart_export_writes_them_on_request(tmp_path: Path) -> None:
     assert (tmp_path / 'c' / 'hexapod_ethercat_6.yaml').exists()
     assert main([*given[:-1], str(tmp_path / 'd')]) == 0
     assert not list((tmp_path / 'd').glob('*drives*'))
+
+
+# Cranks on gear motors, and on servos on a bus
+
+RIG = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml').replaced({
+    'actuator.reflected_inertia': 0.0, 'actuator.viscous_friction': 0.0,
+    'actuator.coulomb_friction': 0.0, 'drive.direction': DIRECTIONS})
+WORM = 50.0  # turns of the motor for one of the crank
+GEARED = RIG.replaced({
+    'drive.gear_ratio': WORM, 'drive.rated_torque': RATED, 'drive.counts_per_turn': 8192.0})
+# A Dynamixel XM430-W350 as its e-Manual has it: 4096 increments a turn, the middle at 2048, units
+# of 2.69 mA and 0.229 rpm, 4.1 N m at 2.3 A. A belt makes 1.5 turns of it for one of the crank.
+BELT, CONSTANT = 1.5, 4.1 / 2.3
+BUS = {'drive.gear_ratio': BELT, 'drive.counts_per_turn': 4096.0, 'drive.counts_at_zero': 2048.0,
+       'drive.current_unit': 0.00269, 'drive.torque_constant': CONSTANT,
+       'drive.speed_unit': 0.229 * 2.0 * math.pi / 60.0}
+SMALL = RIG.replaced({
+    **BUS, 'limits.torque_max': 5.0, 'platform.mass': 4.0, 'legs.crank.mass': 0.0,
+    'legs.rod.mass': 0.0, 'platform.inertia': [0.1, 0.0, 0.0, 0.1, 0.0, 0.1]})
+
+
+class Servo(NamedTuple):
+    """A servo on a bus that turns a crank by a belt; a program sees bytes of its registers."""
+
+    direction: float  # in which it drives the angle of the crank up
+    zero: int = 2048
+
+    def crank(self, register: bytes) -> float:
+        """Return the angle of the crank for four bytes of Goal Position, at 0.087890625 deg."""
+        count = int.from_bytes(register, 'little', signed=True)
+        return self.direction * math.radians((count - self.zero) * 0.087890625) / BELT
+
+    def torque(self, register: bytes) -> float:
+        """Return the torque of the crank for two bytes of Goal Current."""
+        milliamperes = 2.69 * int.from_bytes(register, 'little', signed=True)
+        return self.direction * milliamperes / 1000.0 * CONSTANT * BELT
+
+
+def compiled(folder: Path, header: str, functions: Mapping[str, str]) -> ctypes.CDLL:
+    """Return a library with functions of the header of rig; name: type of the argument, result."""
+    if not shutil.which('gcc'):
+        pytest.skip('needs gcc')
+    (folder / 'rig_drives.h').write_text(header)
+    lines = ['#include "rig_drives.h"']
+    for name, types in functions.items():
+        argument, result = types.split()
+        lines.append(f'{result} call_{name}(int leg, {argument} value);\n{result} call_{name}(int '
+                     f'leg, {argument} value) {{return rig_{name}(leg, value);}}')
+    (folder / 'calls.c').write_text('\n'.join(lines) + '\n')
+    subprocess.run(['gcc', '-std=c99', '-Wall', '-Wextra', '-Wpedantic', '-Werror', '-Wconversion',
+                    '-shared', '-fPIC', folder / 'calls.c', '-o', folder / 'calls.so'], check=True)
+    library = ctypes.CDLL(str(folder / 'calls.so'))
+    of_c = {'double': ctypes.c_double, 'int16_t': ctypes.c_int16, 'int32_t': ctypes.c_int32}
+    for name, types in functions.items():
+        argument, result = types.split()
+        function = getattr(library, f'call_{name}')  # kept, unlike library[...]
+        function.argtypes, function.restype = [ctypes.c_int, of_c[argument]], of_c[result]
+    return library
+
+
+def test_a_mock_gear_motor_turns_its_crank(tmp_path: Path) -> None:
+    """Angle, speed, torque by CiA 402, moteus and ODrive, with gear and sign."""
+    platform, texts = StewartPlatform(GEARED), drive_files(GEARED, 'rig')
+    call = compiled(tmp_path, str(texts['rig_drives.h']), {
+        'turns': 'double double', 'torque': 'double double', 'odrive_torque': 'double int16_t',
+        'odrive_velocity': 'double int16_t', 'counts': 'double int32_t',
+        'per_mille': 'double int16_t', 'per_mille_of_leg_torque': 'double int16_t',
+        'leg_torque': 'int16_t double', 'position': 'int32_t double'})
+    home = platform.home_pose()
+    motion = Motion(home.position + [0.02, -0.03, 0.04], home.rotation, [0.2, -0.1, 0.3],
+                    [0.3, 0.1, -0.2], [0.5, 1.0, -2.0], [1.0, 0.0, 0.5])
+    result = platform.inverse_dynamics(motion)
+    motors = platform.motors(motion)
+    for leg, direction in enumerate(DIRECTIONS):
+        angle, speed, torque = (float(each[leg]) for each in (
+            result.angles, result.speeds, result.torques))
+        # An axle that turns once for 50 turns of its motor.
+        turns = call.call_turns(leg, angle)
+        assert direction * turns / WORM * 2.0 * math.pi == pytest.approx(angle, rel=1e-14)
+        assert call.call_turns(leg, speed) * 2.0 * math.pi == pytest.approx(
+            direction * motors.speeds[leg], rel=1e-12)
+        given = float(motors.torques[leg])
+        assert direction * call.call_torque(leg, given) * WORM == pytest.approx(torque, rel=1e-12)
+        assert direction * call.call_odrive_torque(leg, given) / 1000.0 * WORM == pytest.approx(
+            torque, abs=0.5e-3 * WORM)
+        assert direction * call.call_odrive_velocity(leg, speed) / 1000.0 / WORM == pytest.approx(
+            speed / (2.0 * math.pi), abs=1e-3 / WORM)
+        counts = call.call_counts(leg, angle)
+        assert direction * counts / 8192.0 / WORM * 2.0 * math.pi == pytest.approx(
+            angle, abs=2.0 * math.pi / 8192.0 / WORM)
+        assert call.call_position(leg, counts) == pytest.approx(angle, abs=1e-5)
+        for raw in (call.call_per_mille(leg, given), call.call_per_mille_of_leg_torque(
+                leg, torque)):
+            assert direction * raw / 1000.0 * RATED * WORM == pytest.approx(
+                torque, abs=0.51e-3 * RATED * WORM)
+            assert call.call_leg_torque(leg, raw) == pytest.approx(
+                torque, abs=0.51e-3 * RATED * WORM)
+        mock = Mock.of(str(texts[f'rig_ethercat_{leg + 1}.yaml']), direction)
+        assert abs(mock.raw(0x607a, angle) - counts) <= 1
+        assert abs(mock.raw(0x60b2, torque) - call.call_per_mille(leg, given)) <= 1
+
+
+def test_mock_servos_on_a_bus_carry_the_platform(tmp_path: Path) -> None:
+    """Their horns turn the cranks to the pose, their currents alone hold the platform there."""
+    platform, texts = StewartPlatform(SMALL), drive_files(SMALL, 'rig')
+    assert sorted(texts) == ['rig_drives.h', 'rig_drives.md']
+    header = str(texts['rig_drives.h'])
+    assert 'rated_torque' not in header and 'per_mille' not in header
+    call = compiled(tmp_path, header, {
+        'goal_position': 'double int32_t', 'present_position': 'int32_t double',
+        'present_velocity': 'int32_t double', 'goal_current': 'double int16_t',
+        'present_torque': 'int16_t double', 'turns': 'double double'})
+    home = platform.home_pose()
+    pose = Pose(home.position + [0.01, -0.02, 0.03], home.rotation)
+    motion = Motion.from_pose(pose)
+    result, motors = platform.inverse_dynamics(motion), platform.motors(motion)
+    angles, torques = np.empty(6), np.empty(6)
+    for leg, direction in enumerate(DIRECTIONS):
+        servo = Servo(direction)
+        count = call.call_goal_position(leg, result.angles[leg])
+        register = count.to_bytes(4, 'little', signed=True)
+        angles[leg] = servo.crank(register)
+        assert call.call_present_position(leg, count) == pytest.approx(angles[leg], abs=1e-14)
+        current = call.call_goal_current(leg, motors.torques[leg])
+        register = current.to_bytes(2, 'little', signed=True)
+        torques[leg] = servo.torque(register)
+        assert call.call_present_torque(leg, current) * BELT == pytest.approx(
+            torques[leg], rel=1e-12)
+        # 100 counts of velocity are 22.9 rpm of the horn.
+        assert call.call_present_velocity(leg, 100) == pytest.approx(
+            direction * 22.9 * 2.0 * math.pi / 60.0 / BELT, rel=1e-12)
+        assert call.call_goal_position(leg, 0.0) == 2048
+        for bad in (math.nan, math.inf, -math.inf):
+            assert call.call_goal_current(leg, bad) in (0, 32767, -32768)
+    assert np.abs(angles - result.angles).max() < math.radians(0.0879) / 2.0 / BELT + 1e-12
+    assert np.abs(torques - result.torques).max() < 0.51 * 0.00269 * CONSTANT * BELT
+    accelerated = platform.forward_dynamics(motion, torques)
+    assert np.abs(accelerated.linear_acceleration).max() < 0.1
+    assert platform.forward_dynamics(motion, -torques).linear_acceleration[2] < -9.9
+
+
+def test_the_page_says_where_the_servos_are_at_the_limits() -> None:
+    page = str(drive_files(SMALL, 'rig')['rig_drives.md'])
+    low, high = (2048.0 + 4096.0 * BELT * side * (math.pi / 3.0) / (2.0 * math.pi)
+                 for side in (-1.0, 1.0))
+    assert (low, high) == (1024.0, 3072.0)
+    assert '1024 to 3072, 3072 to 1024, 1024 to 3072' in page
+    assert 'EtherCAT' not in page and '607Ah, increments' not in page
+    assert f'| {1.0 / (0.00269 * CONSTANT):.6g} |' in page and f'| {1.0 / BELT:.6g} |' in page
+    both = drive_files(SMALL.replaced({'drive.rated_torque': 1.0}), 'rig')
+    assert len(both) == 8 and 'EtherCAT' in str(both['rig_drives.md'])
+    geared = str(drive_files(GEARED, 'rig')['rig_drives.md'])
+    assert 'Dynamixel' not in geared and f'| {1.0 / WORM:.6g} |' in geared
+
+
+@pytest.mark.parametrize('changes', [
+    {'drive.counts_per_turn': None}, {'drive.torque_constant': None},
+    {'drive.current_unit': 2.69e-9}, {'drive.counts_at_zero': None, 'drive.current_unit': None},
+    {'drive.counts_per_turn': 1e11}])
+def test_servos_on_a_bus_that_are_not_known_are_rejected(
+        changes: dict[str, Any], snapshot: Snapshot) -> None:
+    with snapshot.raises(ParameterError):
+        drive_files(SMALL.replaced(changes), 'rig')

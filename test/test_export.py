@@ -537,7 +537,8 @@ def test_servos_out_of_range_or_not_measured_get_no_pulses(snapshot: Snapshot) -
 @pytest.mark.parametrize('changes', [
     {'servo.angle_at_min': None}, {'servo.angle_at_min': 1.0, 'servo.angle_at_max': 1.0},
     {'servo.pulse_min': 0.0015, 'servo.pulse_max': [0.002, 0.002, 0.0015, 0.002, 0.002, 0.002]},
-    {'servo.pulse_max': 2500.0}, {'servo.angle_at_max': 60.0}])
+    {'servo.pulse_max': 2500.0}, {'servo.pulse_max': 2.5}, {'servo.angle_at_max': 60.0},
+    {'servo.angle_at_min': -60.0}])
 def test_points_of_servos_that_cannot_be(changes: dict[str, Any], snapshot: Snapshot) -> None:
     with snapshot.raises(ParameterError):
         servo_rig(**changes)

@@ -156,6 +156,18 @@ def test_the_demo_runs_and_ends(launch: Launch, peer: Peer) -> None:
 
 
 @pytest.mark.slow
+def test_the_demo_begins_where_the_motion_of_another_hexapod_does(
+        launch: Launch, peer: Peer) -> None:
+    measured = peer.listen('/stewart_simulator/leg_states', JointState)
+    commands = peer.listen('/stewart_simulator/commands', Float64MultiArray)
+    program = launch('demo.launch.py', f'params_file:={ROOT / "config" / "crank_platform.yaml"}',
+                     f'trajectory_file:={ROOT / "config" / "trajectory_cranks.yaml"}')
+    peer.until(lambda: len(commands) > 100 and len(measured) > 100, 'the loop runs')
+    assert program.stop() == 0
+    assert 'cannot reach' not in said(program)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize('file', ['demo.launch.py', 'cueing.launch.py'])
 def test_a_loop_ends_with_one_of_its_programs(
         launch: Launch, peer: Peer, tmp_path: Path, file: str) -> None:

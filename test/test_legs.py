@@ -19,7 +19,6 @@ from stewart_dynamics import (
     calibrate, Capability, MotionCueing, ParameterError, Parameters, Pose, StewartPlatform)
 from stewart_dynamics.calibration.pose_design import design_poses
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
-from stewart_dynamics.export.drive_files import drive_files
 from stewart_dynamics.export.linuxcnc import hal_lines
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import Identification
@@ -37,7 +36,7 @@ LINUXCNC = '--linuxcnc: genhexkins has lengths of legs'
 PROGRAMS = {
     'stewart_calibrate poses.csv': 'calibration', 'stewart_calibrate --design 20': 'calibration',
     'stewart_cueing_report vehicle.csv': 'motion cueing',
-    'stewart_export --fmu --drives': '--drives', 'stewart_export --linuxcnc': LINUXCNC,
+    'stewart_export --fmu --linuxcnc': LINUXCNC, 'stewart_export --linuxcnc': LINUXCNC,
     'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification'}
 NODES = {
     f'stewart_cueing --ros-args --params-file {CRANK_FILE}': 'motion cueing'}
@@ -80,7 +79,6 @@ CALLS: dict[str, Callable[[StewartPlatform], object]] = {
     'identification': lambda platform: Identification(
         platform.parameters, IdentificationOptions()),
     'identification ': lambda platform: design(platform.parameters, DesignOptions()),
-    '--drives': lambda platform: drive_files(platform.parameters, 'rig'),
     LINUXCNC: lambda platform: hal_lines(platform.parameters),
     'motion cueing ': lambda platform: CueingParameters(
         platform.parameters.given, platform.parameters.source)}

@@ -11,13 +11,16 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import re
+import textwrap
 from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from referees import Array, random_direction, rng, rotation_about
+from referees import Array, random_direction, rng, ROOT, rotation_about
 from stewart_dynamics import Motion, StewartPlatform
+from stewart_dynamics.description import main as describe
 from stewart_dynamics.description.recognition import read_hexapod
 
 pin = pytest.importorskip('pinocchio')
@@ -141,6 +144,28 @@ class Model:
         tau = pin.rnea(model, data, q, v, a)
         return q[self.angles], np.linalg.solve(freedoms[self.drives].T, freedoms.T @ tau)
 
+    def gravity_compensation(self, motion: Motion) -> Array:
+        """
+        Return torques (6,) of the drives at rest by the formula of their gravity compensation.
+
+        Torques of the tree as those of a wrench on the head, by the pseudo-inverse of the head's
+        Jacobian; the drives carry this wrench. ``compute_gravity_torque`` in their
+        ``kinematics/placo_kinematics.py``, written down here with Pinocchio.
+        """
+        model, data = self.model, self.data
+        q = self.closed(motion)
+        rows, _ = self._jacobians(q)
+        model.gravity.linear = np.array([0.0, 0.0, -9.80665])
+        tree = pin.computeGeneralizedGravity(model, data, q)
+        head = pin.getFrameJacobian(model, data, self.head, AXES)
+        wrench = np.linalg.pinv(head.T) @ tree
+        driven = np.zeros((model.nv, 6))
+        gaps = np.vstack([rows[:15], np.eye(len(self.free))[
+            [self.free.index(drive) for drive in self.drives]]])
+        unit = np.vstack([np.zeros((15, 6)), np.eye(6)])
+        driven[self.free] = np.linalg.lstsq(gaps, unit, rcond=1e-12)[0]
+        return (head @ driven).T @ wrench
+
 
 def random_motions(count: int, moving: bool) -> list[Motion]:
     random, home = rng(0), np.array([0.0, 0.0, 0.1148])
@@ -181,3 +206,42 @@ def test_their_mjcf_is_the_same_machine_with_its_own_drives():
         truth = StewartPlatform(of_urdf).inverse_dynamics(motion).torques
         found = StewartPlatform(still).inverse_dynamics(motion).torques
         assert np.abs(found - truth).max() < 1e-4 * np.abs(truth).max()
+
+
+PAGE = ROOT / 'docs' / 'magic_number.md'
+
+
+def test_the_commands_of_the_page_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    page = PAGE.read_text(encoding='utf-8')
+    command = re.search('^    stewart_describe --from robot.urdf (.*)$', page, re.MULTILINE)[1]
+    assert describe(['--from', str(URDF), *command.split()]) == 0
+    lines = re.findall('^    (import numpy.*?)\n\n\\|', page, re.MULTILINE | re.DOTALL)[0]
+    capsys.readouterr()
+    exec(compile(textwrap.dedent('    ' + lines), 'magic_number.md', 'exec'), {})
+    printed = np.array(capsys.readouterr().out.strip('[]\n ').split(), float)
+    assert np.abs(printed - [21.13, -21.41, 22.59, -22.05, 23.36, -23.61]).max() < 0.02
+
+
+def test_numbers_of_the_page_are_those_of_their_formula_and_of_the_package():
+    """Torques at home, leg by leg, and how far the formula misses over 60 poses at rest."""
+    hexapod = read_hexapod(URDF)
+    platform, model = StewartPlatform(hexapod.parameters), Model(False)
+    model.place_platform(hexapod.parameters['geometry.platform_joints'])
+    page = PAGE.read_text(encoding='utf-8')
+    home = Motion.from_pose(platform.forward_kinematics(
+        0.62654 * np.tile([1.0, -1.0], 3)))
+    torques, theirs = platform.inverse_dynamics(home).torques, model.gravity_compensation(home)
+    for n in range(6):
+        row = re.search(rf'\| stewart_{n + 1} \| (\S+) \| (\S+) \| (\S+) %', page)
+        assert float(row[1]) == pytest.approx(1e3 * torques[n], abs=0.02)
+        assert float(row[2]) == pytest.approx(1e3 * theirs[n], abs=0.02)
+        assert float(row[3]) == pytest.approx(100.0 * (1.0 - theirs[n] / torques[n]), abs=0.15)
+    missed = []
+    for motion in random_motions(60, False):
+        torques = platform.inverse_dynamics(motion).torques
+        missed.append(np.abs(model.gravity_compensation(motion) - torques).max()
+                      / np.abs(torques).max())
+    median, worst = re.search(r'median (\S+) %, at the worst pose (\S+) %', page).groups()
+    assert float(median) == pytest.approx(100.0 * np.median(missed), abs=0.06)
+    assert float(worst) == pytest.approx(100.0 * max(missed), abs=0.06)

@@ -13,7 +13,8 @@ from snapshot import Snapshot
 
 from stewart_dynamics import Motion, MotionError, ParameterError, StewartPlatform
 from stewart_dynamics.mechanics.frames import rotation as rotations
-from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_time, sample_times
+from stewart_dynamics.reference_motion.motion_functions import (
+    first_pose, motion_at, sample_time, sample_times)
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.reference_motion.multisine import multisine
 from stewart_dynamics.setpoints.step import Batch, Step
@@ -52,6 +53,19 @@ MOTIONS = {
     'hold': {'motion.type': 'hold', 'motion.initial': INITIAL, 'motion.duration': 3.0},
 }
 POINT_TO_POINT = ('paper', 'quintic')
+
+
+@pytest.mark.parametrize('path', FILES, ids=lambda path: path.stem)
+def test_a_simulator_can_begin_where_a_motion_does(path: Path) -> None:
+    parameters = ReferenceMotionParameters.from_yaml(path)
+    pose, begin = first_pose(parameters), motion_at(parameters, 0.0)
+    assert pose.shape == (6,)
+    assert np.array_equal(pose[:3], begin.position)
+    assert np.abs(rotations.from_euler(pose[3:]) - begin.rotation).max() < 1e-15
+    if path.stem == OF_CRANKS:
+        rig = StewartPlatform.from_yaml(CONFIG / 'crank_platform.yaml')
+        assert np.abs(pose[:3] - rig.home_pose().position).max() < 1e-6
+        assert np.abs(pose[3:]).max() < 1e-12
 
 
 @pytest.fixture(scope='module')

@@ -269,3 +269,40 @@ def test_an_imu_that_repeats_its_reading_is_at_rest(program: Path) -> None:
     assert (found['code'] == 0).all()
     assert (found['base'] == found['base'][0]).all()
     assert np.ptp(found['efforts'], axis=0).max() == 0.0
+
+
+def test_commands_turn_cranks_by_mock_gear_motors(program: Path) -> None:
+    """
+    Units and signs of commands: positions [rad], torques [N m] and speeds of the motors [rad/s].
+
+    A mock gear motor counts 8192 increments a turn in its own sense, makes per mille of its rated
+    torque, and turns its crank by a gear of 50.
+    """
+    directions = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0])
+    counts, gear, rated = 8192.0, 50.0, 2.4
+    p = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml').replaced({
+        'actuator.reflected_inertia': 0.0, 'actuator.viscous_friction': 0.0,
+        'actuator.coulomb_friction': 0.0, 'drive.gear_ratio': gear,
+        'drive.direction': directions, 'drive.rated_torque': rated,
+        'drive.counts_per_turn': counts})
+    platform = StewartPlatform(p)
+    home = platform.home_pose()
+    moves = 0.03 * rng(4).uniform(-1.0, 1.0, (20, 3))
+    motion = Motion(home.position + moves, np.tile(np.eye(3), (20, 1, 1)), 0.1 * moves / 0.03,
+                    np.zeros((20, 3)), moves / 0.03, np.zeros((20, 3)))
+    found = run(program, p, [Cycle(n * PERIOD, each) for n, each in enumerate(
+        to_references(motion)[0])], reference='platform')
+    assert (found['code'] == CODES['STEWART_OK']).all()
+    on_bus = np.round(directions * found['positions'] * gear * counts / (2.0 * np.pi))
+    angles = directions * on_bus / counts / gear * 2.0 * np.pi
+    speeds = found['motor_velocities'] / gear
+    per_mille = np.round(directions * found['torques'] * 1e3 / rated)
+    torques = directions * per_mille * 1e-3 * rated * gear
+    for n in range(len(motion)):
+        pose = platform.forward_kinematics(angles[n])
+        assert np.abs(pose.position - motion.position[n]).max() < 1e-5
+        expected = platform.inverse_dynamics(motion[n])
+        assert np.abs(speeds[n] - expected.speeds).max() < 1e-12
+        assert np.abs(torques[n] - expected.torques).max() < 0.51e-3 * rated * gear
+        moved = platform.forward_dynamics(motion[n], torques[n])
+        assert np.abs(moved.linear_acceleration - motion.linear_acceleration[n]).max() < 0.05

@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
-from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.errors import ParameterError, shown_name
 from stewart_dynamics.legs.crank import CRANK
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.legs.telescopic import TELESCOPIC
@@ -16,10 +17,29 @@ from stewart_dynamics.legs.telescopic import TELESCOPIC
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
+_EXAMPLES = Path(__file__).with_name('examples')
 KINDS: tuple[LegKind, ...] = (TELESCOPIC, CRANK)
 for _kind in KINDS:
     _kind.foreign = tuple(name for each in KINDS if each is not _kind for name in each.own
                           if name not in _kind.own)
+
+
+def example_names() -> tuple[str, ...]:
+    """Return the names of the parameter files to begin with, one of each kind."""
+    return tuple(sorted(path.stem for path in _EXAMPLES.glob('*.yaml')))
+
+
+def example(name: str) -> str:
+    """
+    Return a commented parameter file to begin with.
+
+    Raises ParameterError: the name is not in ``example_names``.
+    """
+    if name not in example_names():
+        given = shown_name(name) if name else 'missing'
+        raise ParameterError(
+            f'--example: {given}: must be one of {", ".join(example_names())}')
+    return (_EXAMPLES / f'{name}.yaml').read_text(encoding='utf-8')
 
 
 def kind_of(values: Mapping[str, Any]) -> LegKind:

@@ -93,6 +93,9 @@ class Crank(LegKind):
         AXES, DIRECTIONS, *(f'legs.{part}.{each}' for part in tree.PARTS
                             for each in ('length', 'mass', 'center_of_mass', 'inertia')))
     shortened = HEADINGS,
+    anchors_are = 'ends of the cranks'
+    moved, moves, unit_word = 'crank', '+ drives the angle up', 'radian'
+    large_effort = 1.0, '1 N m'
     likely = {'geometry.crank_branch': (AUTO,)}
     inertia_unit = 'kg m^2'
     reflected, rotors = 'N^2 J', 'rotor and gear'
@@ -341,12 +344,11 @@ class Crank(LegKind):
         at = self.lines(parameters, home.position, home.rotation)
         if not np.isfinite(at.directions).all():
             return iter(())
-        legs: Any = parameters.structure['legs']
-        position = crank_mistakes.above_motors(parameters, home)
-        both = _angles_of_branches(parameters, position, home.rotation)[2]
-        angles = np.where(legs['branch'] > 0.0, both[:, 0], both[:, 1])
+        above, at_home = (
+            _angles_of_branches(parameters, position, home.rotation)[2] for position in (
+                crank_mistakes.above_motors(parameters, home), home.position))
         return crank_mistakes.likely_mistakes(
-            parameters, home, angles, at.levers(), crank_bodies(parameters))
+            parameters, home, above, at_home, at.levers(), crank_bodies(parameters))
 
     def home_rule(self, parameters: Parameters, anchors: Array) -> str:
         """Return that the rods are shorter than the gap, or far too long."""

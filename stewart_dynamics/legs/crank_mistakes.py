@@ -17,7 +17,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
-from stewart_dynamics.legs.kind import AtHome
+from stewart_dynamics.legs.kind import AtHome, impossible_inertia, STANDARD_G
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -27,12 +27,19 @@ CRANK_LENGTH, ROD_LENGTH = 'legs.crank.length', 'legs.rod.length'
 _LENGTH_RATIO = 100.0
 # No crank turns by more than two turns to either side, or faster than 950 rpm.
 _LARGEST_ANGLE, _FASTEST = 4.0 * math.pi, 100.0  # [rad], [rad/s]
+# At home cranks are nearer than this to the middle of their limits, unless all six differ [rad].
+_AT_MIDDLE = 0.1
 # Angles at home of symmetric cranks differ by less: a tooth of a servo's horn is 0.25 rad. Where
 # four or more are equal, as in a drawing, the others are.
 _ALIKE, _EQUAL, _ALIKE_WHERE_EQUAL = 0.02, 1e-6, 1e-3  # [rad]
 _MIRRORED = 0.01  # largest misfit of mirror images, by the radius of the joints
 # Radius of gyration of a crank or rod by its length: 0.3 to 1.
 _LARGEST_GYRATION, _SMALLEST_GYRATION = 3.0, 0.01
+# Stall torque times speed times the torque by that at home, for servos of 2 to 400 kg cm: 300 to
+# 8e3 W; with kg cm taken as N m 104 times as much. Speed of a servo if it is not given.
+_LARGEST_POWER, _SERVO_SPEED = 1e4, 7.0  # [W], [rad/s]
+# Servos need 0.05 to 0.5 s for 60 degrees; none needs two.
+_SLOWEST_SERVO, _SIXTY = 0.5, math.pi / 3.0  # [rad/s], [rad]
 # Centers of mass of rods are between their joints, or a little beyond.
 _BEYOND = 0.5
 
@@ -72,22 +79,32 @@ def gap_of(p: Parameters, ends: Array) -> float:
             ends - ends.mean(axis=0) - joints + joints.mean(axis=0), axis=1)))
 
 
-def likely_mistakes(p: Parameters, home: AtHome, angles: Array, levers: Array,
+def likely_mistakes(p: Parameters, home: AtHome, above: Array, at_home: Array, levers: Array,
                     bodies: tuple[Array, Array]) -> Iterator[str]:
     """
     Yield other mistakes.
 
-    angles (6,): with the platform ``above_motors`` [rad], nan where a rod does not reach. levers
-    (6,): at home [m]. bodies: centers of mass (6, 3) and inertias (6, 6) of the cranks.
+    above, at_home (6, 2): angles with the branches positive and negative [rad], nan where a rod
+    does not reach, with the platform ``above_motors`` and at home. levers (6,): at home [m].
+    bodies: centers of mass (6, 3) and inertias (6, 6) of the cranks.
     """
+    pushing = levers > 0.0
+    angles, angles_at_home = (
+        np.where(pushing, each[:, 0], each[:, 1]) for each in (above, at_home))
     sizes = p[CRANK_LENGTH]
     fastest = p.limits.speed_max
     if fastest is not None and fastest.max() > _FASTEST:
         yield f'limits.speed_max: {fastest.max():.3g} rad/s: in degrees per second, or in rpm?'
-    signs = tuple(_signs_and_zeros(p, home, angles, np.sign(levers)))
+    elif fastest is not None and fastest.min() < _SLOWEST_SERVO and _has_servos(p):
+        yield (f'limits.speed_max: {fastest.min():.3g} rad/s: the time of a servo for 60 degrees? '
+               f'{fastest.min():.3g} s for 60 degrees are {_SIXTY / fastest.min():.3g} rad/s')
+    yield from _turned_over_twice(p, home)
+    signs = tuple(_branches(p, at_home, levers)) or tuple(
+        _signs_and_zeros(p, home, angles, np.sign(levers)))
     yield from signs
+    if not signs:
+        yield from _servos(p, angles_at_home)
     yield from _bodies(p, *bodies)
-    yield from _servos(p)
     ratios, least = np.abs(levers) / sizes, p['limits.lever_min']
     at = int(np.argmin(ratios - least))
     if ratios[at] < least[at]:
@@ -96,24 +113,6 @@ def likely_mistakes(p: Parameters, home: AtHome, angles: Array, levers: Array,
                'radius in another unit?')
     elif not signs and home.efforts is not None:
         yield from _loads_at_home(p, np.abs(home.efforts), np.abs(levers))
-
-
-def _servos(p: Parameters) -> Iterator[str]:
-    """Yield limits of angles that a servo does not reach: travels would be stated beyond it."""
-    points = p['servo.angle_at_min'], p['servo.angle_at_max']
-    if points[0] is None:
-        return
-    low, high = np.minimum(*points), np.maximum(*points)
-    limits = p.limits.angle_min, p.limits.angle_max
-    least, most = (np.full(6, turn) if limit is None else limit for limit, turn in zip(
-        limits, (-_LARGEST_ANGLE, _LARGEST_ANGLE), strict=True))
-    beyond = np.maximum(low - least, most - high)
-    leg = int(np.argmax(beyond))
-    if beyond[leg] > _EQUAL:
-        ends = ['not set' if limit is None else f'{limit[leg]:.4g} rad' for limit in limits]
-        yield (f'limits.angle_min, limits.angle_max: {p.joints[leg]}: {ends[0]}, '
-               f'{ends[1]}, but its servo turns from {low[leg]:.4g} to {high[leg]:.4g} '
-               'rad between its two points: narrow the limits, from which travel is computed')
 
 
 def above_motors(p: Parameters, home: AtHome) -> Array:
@@ -137,8 +136,7 @@ def above_motors(p: Parameters, home: AtHome) -> Array:
 
 def _signs_and_zeros(p: Parameters, home: AtHome, angles: Array, signs: Array) -> Iterator[str]:
     """Yield cranks that differ from those of which they should be copies or mirror images."""
-    low, high = p.limits.angle_min, p.limits.angle_max
-    middles = np.zeros(6) if low is None or high is None else 0.5 * (low + high)
+    middles = _middles(p)
     turned = signs * (angles - middles)
     if not np.isfinite(turned).all():
         return
@@ -169,6 +167,69 @@ def _signs_and_zeros(p: Parameters, home: AtHome, angles: Array, signs: Array) -
         yield (f'{name}: at home {_names(p, np.flatnonzero(alike))} have an angle of '
                f'{one:.3g} rad, {_names(p, others)} of {other:.3g} rad, but the joints are '
                'mirror images in pairs: cranks of a pair point in mirrored directions, too')
+
+
+def _turned_over_twice(p: Parameters, home: AtHome) -> Iterator[str]:
+    """Yield that both gravity and the side of the platform turn a hexapod with headings over."""
+    toward_base = float(-p.gravity @ home.up)
+    fixed = p.table['base.source'].default
+    if (p.geometry.platform_side == 'negative' and 'geometry.crank_angles' in p.given
+            and p.base.source == fixed and toward_base > 0.5 * np.linalg.norm(p.gravity) > 0.0
+            and float(p.gravity[2]) > 0.0):
+        gravity = ', '.join(f'{each:.3g}' for each in p.gravity)
+        yield (f'gravity: [{gravity}] m/s^2 and geometry.platform_side: negative: each turns the '
+               'hexapod over, both together have the platform above the base: for a hexapod that '
+               'hangs give one of them; where z points down give geometry.crank_axes and '
+               'geometry.crank_directions, as positive geometry.crank_angles lift toward z')
+
+
+def _branches(p: Parameters, at_home: Array, levers: Array) -> Iterator[str]:
+    """Yield branches by which a crank is outside its limits at home, and not by the other one."""
+    given = np.broadcast_to(p['geometry.crank_branch'], 6)
+    low, high = (side * np.inf if limit is None else limit for side, limit in (
+        (-1.0, p.limits.angle_min), (1.0, p.limits.angle_max)))
+    positive = levers > 0.0
+    chosen, other = np.where(positive, at_home.T, at_home.T[::-1])
+    outside = (chosen < low - _ALIKE_WHERE_EQUAL) | (chosen > high + _ALIKE_WHERE_EQUAL)
+    expected = np.abs(other - _middles(p)) <= _AT_MIDDLE
+    for leg in np.flatnonzero((given != 'auto') & outside & expected)[:1]:
+        name, limit = (('limits.angle_max', high) if np.any(chosen[leg] > np.broadcast_to(
+            high, 6)[leg]) else ('limits.angle_min', low))
+        yield (f'geometry.crank_branch: {given[leg]}: {p.joints[leg]}: at home the angle is '
+               f'{chosen[leg]:.3g} rad, beyond {name}, {np.broadcast_to(limit, 6)[leg]:.3g} rad; '
+               f'with the other branch {_rounded(other[leg]):.3g} rad: the other one?')
+
+
+def _middles(p: Parameters) -> Array:
+    """Return the angles by which home is found (6,)."""
+    low, high = p.limits.angle_min, p.limits.angle_max
+    return np.zeros(6) if low is None or high is None else 0.5 * (low + high)
+
+
+def _servos(p: Parameters, angles: Array) -> Iterator[str]:
+    """Yield servos without a pulse at home (6,), or within the limits of their cranks."""
+    first, last = p.servo.angle_at_min, p.servo.angle_at_max
+    if first is None or last is None:
+        return
+    least, most = np.minimum(first, last), np.maximum(first, last)
+    beyond = np.maximum(least - angles, angles - most)
+    at = int(np.nanargmax(beyond)) if np.isfinite(beyond).any() else 0
+    if beyond[at] > _ALIKE_WHERE_EQUAL:
+        yield (f'servo.angle_at_min: {first[at]:.3g} rad, servo.angle_at_max: '
+               f'{last[at]:.3g} rad: {p.joints[at]}: no pulse turns the servo to the angle at '
+               f'home, {_rounded(angles[at]):.3g} rad: angles of the horn on another zero, or a '
+               'sign? They are angles of the crank')
+        return
+    for name, ends, sign in (('limits.angle_max', most, 1.0), ('limits.angle_min', least, -1.0)):
+        limit: Array | None = p[name]
+        missing = sign * ((sign * _LARGEST_ANGLE if limit is None else limit) - ends)
+        at = int(np.argmax(missing))
+        if missing[at] > _ALIKE_WHERE_EQUAL:
+            given = 'not set' if limit is None else f'{limit[at]:.3g} rad'
+            yield (f'{name}: {given}: the servo of {p.joints[at]} ends at {ends[at]:.3g} rad, by '
+                   'servo.*: no pulse turns it to angles in between; limit the angle to that of '
+                   'the servo')
+            return
 
 
 def _rounded(angle: Any) -> float:
@@ -209,6 +270,14 @@ def _bodies(p: Parameters, centers: Array, inertias: Array) -> Iterator[str]:
         yield (f'legs.crank.center_of_mass: {away[at]:.3g} m from the axis of the motor, but the '
                f'crank is {sizes[at]:.3g} m long: in mm?')
     yield from _gyration('legs.crank', masses, inertias[:, 5], sizes)
+    if p['legs.crank.inertia'].shape != (1,):  # which is that about the axis alone
+        for inertia in inertias:
+            words = tuple(impossible_inertia(
+                'legs.crank.inertia', np.linalg.eigvalsh(
+                    inertia[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]), 'xx xy xz yy yz zz'))
+            yield from words
+            if words:
+                break
     rods, masses = p[ROD_LENGTH], p['legs.rod.mass']
     along = np.where(masses > 0.0, p['legs.rod.center_of_mass'] / rods, 0.5)
     at = int(np.argmax(np.abs(along - 0.5)))
@@ -246,11 +315,30 @@ def _loads_at_home(p: Parameters, torques: Array, levers: Array) -> Iterator[str
             at = int(np.argmax(friction - most))
             yield (f'actuator.coulomb_friction: {friction[at]:.3g} N m: {p.joints[at]} cannot '
                    f'move with limits.torque_max, {most[at]:.3g} N m: in mN m?')
+        else:
+            yield from _torques_of_servos(p, most, torques)
     pushes, largest = torques / levers, p.limits.rod_force_max
     if largest is not None and np.any(pushes > largest):
         at = int(np.argmax(pushes / largest))
         yield (f'limits.rod_force_max: {largest[at]:.3g} N: the rod of {p.joints[at]} carries '
                f'{pushes[at]:.3g} N while the platform is at rest at home: in kN?')
+
+
+def _has_servos(p: Parameters) -> bool:
+    return any(each.startswith('servo.') for each in p.given)
+
+
+def _torques_of_servos(p: Parameters, most: Array, torques: Array) -> Iterator[str]:
+    """Yield torques that no servo has at its speed, for a platform that needs torques (6,)."""
+    if not _has_servos(p):
+        return
+    fastest = np.full(6, _SERVO_SPEED) if p.limits.speed_max is None else p.limits.speed_max
+    powers = most * fastest * most / np.maximum(torques.max(), 1e-12)
+    at = int(np.argmax(powers))
+    if powers[at] > _LARGEST_POWER:
+        yield (f'limits.torque_max: {most[at]:.3g} N m: {most[at] / torques.max():.3g} times what '
+               f'holds the platform at home, by servos: in kg cm? {most[at]:.3g} kg cm are '
+               f'{most[at] * STANDARD_G / 100.0:.3g} N m')
 
 
 def _mean_radius(points: Array) -> float:

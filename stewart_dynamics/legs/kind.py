@@ -86,6 +86,19 @@ class IntervalBounds(NamedTuple):
     ends: Array  # forces along the line without a push of the platform, at either end [kg]
 
 
+# Violation of the triangle inequality by principal moments rounded to two or three digits.
+_ROUNDING = 0.02
+
+
+def impossible_inertia(name: str, moments: Array, order: str = 'ixx ixy ixz iyy iyz izz',
+                       ) -> Iterator[str]:
+    """Yield that no body has these principal moments (3,), in ascending order."""
+    if moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
+        listed = ', '.join(f'{each:.3g}' for each in moments)
+        yield (f'{name}: principal moments [{listed}] kg m^2: no body has one '
+               f'larger than the sum of the other two: is the order {order}?')
+
+
 class Solid(NamedTuple):
     """A cylinder of each leg, as pictures show it."""
 
@@ -184,6 +197,16 @@ class LegKind(ABC):
         Values of parameters that let the assembly of the legs follow from the other ones.
     zero : str
         The parameter by which the zero of the drive is chosen; empty: its joint has that zero.
+    anchors_are : str
+        Where the lines of force begin, in words.
+    moved : str
+        The part that a drive moves: 'leg'.
+    moves : str
+        A positive position of it: '+ extends'.
+    unit_word : str
+        The unit of the position, in words.
+    large_effort : tuple
+        An effort of the usual size, and in words.
 
     """
 
@@ -227,6 +250,11 @@ class LegKind(ABC):
     elements: tuple[str, ...]
     shortened: tuple[str, ...] = ()
     zero: str = ''
+    anchors_are: str = 'base joints'
+    moved: str
+    moves: str
+    unit_word: str
+    large_effort: tuple[float, str]
     likely: Mapping[str, Any] = {}
     inertia_unit: str  # of the reflected inertia of a drive
     reflected: str  # its formula

@@ -74,6 +74,8 @@ class Telescopic(LegKind):
     inertia_unit = 'kg'
     reflected, rotors = 'J (2 pi / lead)^2', 'rotor and screw'
     friction_units = 'N s/m', 'N'
+    moved, moves, unit_word = 'leg', '+ extends', 'metre'
+    large_effort = 1e3, '1 kN'
     bodies = {'cylinder': 'legs.cylinder.mass', 'piston': 'legs.piston.mass'}
 
     def write_fields(self, legs: Records, parameters: Parameters) -> None:

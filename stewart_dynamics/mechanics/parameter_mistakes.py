@@ -20,7 +20,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.legs.kind import AtHome
+from stewart_dynamics.legs.kind import AtHome, impossible_inertia
 from stewart_dynamics.legs.lines import lines_from
 from stewart_dynamics.mechanics import gravity_mistakes
 from stewart_dynamics.mechanics.drives import drive_mistakes as drives
@@ -82,9 +82,6 @@ _SMALLEST_LENGTH_RATIO = 0.05
 # Sum of the squares of the legs' horizontal parts in the best order, divided by the one given:
 # 1 for hexapods, 0.5 to 0.8 where the platform joints begin with another leg.
 _OTHER_ORDER = 0.9
-
-# Violation of the triangle inequality by principal moments rounded to two or three digits.
-_ROUNDING = 0.02
 
 # The largest distance of the center of mass, in larger radii: a mast of ten times the radius.
 _FARTHEST_CENTER = 10.0
@@ -168,8 +165,8 @@ def _sizes(p: Parameters, shape: Shape) -> Iterator[str]:
         yield (f'{_joints_of(p, "platform")}: {platform:.3g} m from their center, and '
                f'platform.mass only {mass:.3g} kg: in mm?')
     if max(base, platform) > _LARGEST_RATIO * min(base, platform):
-        yield (f'{_joints_of(p, "platform")}: {platform:.3g} m from their center, the base joints '
-               f'{base:.3g} m: one of them in mm?')
+        yield (f'{_joints_of(p, "platform")}: {platform:.3g} m from their center, the '
+               f'{p.leg_kind.anchors_are} {base:.3g} m: one of them in mm?')
     for name in ('singularity.characteristic_length', 'geometry.zero_length',
                  'limits.length_min', 'limits.length_max'):
         if is_too_long(p, name, shape):
@@ -183,7 +180,9 @@ def _base_at_one_point(p: Parameters, shape: Shape) -> str:
     if shape.base_radius > ONE_POINT * reach:
         return ''
     name = ('geometry.base_joints' if p.geometry.base_angles is None else 'geometry.base_angles')
-    return f'{name}: all six are at one point: the legs hold the platform in no pose'
+    which = 'six' if np.ptp(p.geometry.base_joints, axis=0).max() <= ONE_POINT * reach else (
+        f'{p.leg_kind.anchors_are}, at the middle of their limits,')
+    return f'{name}: all {which} are at one point: the legs hold the platform in no pose'
 
 
 def _joints_of(p: Parameters, body: str) -> str:
@@ -206,15 +205,8 @@ def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
     elif gyration < _SMALLEST_GYRATION_OF_A_MASS * shape.platform_radius:
         yield (f'platform.mass: {p.platform.mass:.6g} kg, with platform.inertia a radius of '
                f'gyration of {gyration:.3g} m, but {size}: in g, or the joints in cm?')
-    yield from _impossible_inertia('platform.inertia', moments)
+    yield from impossible_inertia('platform.inertia', moments)
     yield from _far_point('platform.center_of_mass', p.platform.center_of_mass, p, shape)
-
-
-def _impossible_inertia(name: str, moments: Array) -> Iterator[str]:
-    """Yield that no body has these principal moments (3,), in ascending order."""
-    if moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
-        yield (f'{name}: principal moments {_listed(moments)} kg m^2: no body has one '
-               'larger than the sum of the other two: is the order ixx ixy ixz iyy iyz izz?')
 
 
 def _payload(p: Parameters, shape: Shape) -> Iterator[str]:
@@ -227,7 +219,7 @@ def _payload(p: Parameters, shape: Shape) -> Iterator[str]:
         yield (f'payload.inertia: {moments[2]:.3g} kg m^2 at most, with payload.mass, {mass:.3g} '
                f'kg, a radius of gyration of {gyration:.3g} m, but the platform joints are '
                f'{shape.platform_radius:.3g} m from their center: in g mm^2 or kg mm^2?')
-    yield from _impossible_inertia('payload.inertia', moments)
+    yield from impossible_inertia('payload.inertia', moments)
     yield from _far_point('payload.center_of_mass', center, p, shape)
 
 
@@ -264,7 +256,8 @@ def _frames(p: Parameters, home: Home) -> Iterator[str]:
     if shape.platform_radius > _LARGEST_PLATFORM_RATIO * shape.base_radius:
         joints = _joints_of(p, 'platform')
         yield (f'{joints}: {shape.platform_radius:.3g} m from their center, the '
-               f'base joints only {shape.base_radius:.3g} m: base and platform exchanged?')
+               f'{p.leg_kind.anchors_are} only {shape.base_radius:.3g} m: base and platform '
+               'exchanged?')
     if p.base.source == FIXED and gravity_mistakes.likely_mistake(
             p.gravity, home) == gravity_mistakes.AWAY:
         yield (f'gravity: {_listed(p.gravity)} m/s^2 pulls the platform away from the base: a '

@@ -182,8 +182,22 @@ def _broken_rule(parameter: Parameter, entry: Any) -> str:
         entry < parameter.minimum or entry > parameter.maximum
         or (parameter.above and entry == parameter.minimum))
     if out_of_range or (parameter.choices and entry not in parameter.choices):
-        degrees = ': in degrees?' if parameter.unit == 'rad' and entry > parameter.maximum else ''
-        return f'must be {parameter.rule}{degrees}'
+        return f'must be {parameter.rule}{_other_unit(parameter, entry) if out_of_range else ""}'
+    return ''
+
+
+# Parameters of at most this time are pulses of servos: 0.5 to 2.5 ms, 500 to 2500 us [s].
+_LONGEST_OF_PULSES, _IN_MICROSECONDS = 0.1, 100.0
+
+
+def _other_unit(parameter: Parameter, entry: float) -> str:
+    """Return the unit in which a number that is too large is likely given, as a question."""
+    if abs(entry) <= parameter.maximum:
+        return ''
+    if parameter.unit == 'rad':
+        return ': in degrees?'
+    if parameter.unit == 's' and parameter.maximum < _LONGEST_OF_PULSES and entry > 0.0:
+        return ': in microseconds?' if entry >= _IN_MICROSECONDS else ': in ms?'
     return ''
 
 

@@ -345,8 +345,17 @@ class DriveGroup(ParameterGroup):
         'increments of position in one turn of the motor, as the amplifier counts them; for '
         'stewart_export --drives', '', (), minimum=0.0, above=True)
     direction: Array = _legs(
-        '1.0 if positive torque and position of the amplifier extend the leg, else -1.0; for '
-        'stewart_export --drives', '', (1.0,), minimum=-1.0, maximum=1.0)
+        '1.0 if positive torque and position of the amplifier extend the leg or drive the angle '
+        'up, else -1.0; for stewart_export --drives', '', (1.0,), minimum=-1.0, maximum=1.0)
+    counts_at_zero: Array | None = _legs(
+        'increments where the position is zero, as a servo on a bus counts them: 2048 in the '
+        'middle of a turn; for stewart_export --drives', '', ())
+    current_unit: Array | None = _legs(
+        'current that a servo on a bus counts as 1: 0.00269 of a Dynamixel XM430; for '
+        'stewart_export --drives', 'A', (), minimum=0.0, above=True)
+    speed_unit: Array | None = _legs(
+        'speed that a servo on a bus counts as 1: 0.023981, 0.229 rpm, of a Dynamixel X; for '
+        'stewart_export --drives', 'rad/s', (), minimum=0.0, above=True)
     screw_rotation: str = declare(
         'guided: screw and nut cannot turn with the leg; universal: the leg turns between its '
         'universal joints, and its motor makes up for it', '', GUIDED, choices=(GUIDED, UNIVERSAL))

@@ -103,6 +103,12 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
                   ds * change, ds * turn, dds * change, dds * turn)
 
 
+def first_pose(parameters: ReferenceMotionParameters) -> Array:
+    """Return where a motion begins, as a simulator takes its ``initial_pose`` (6,) [m, rad]."""
+    begin = motion_at(parameters, 0.0)
+    return np.concatenate([begin.position, rotations.to_euler(begin.rotation)])
+
+
 def _euler_motion(pose: Array, rate: Array, acceleration: Array) -> Motion:
     return Motion.from_euler(pose[..., :3], pose[..., 3:], rate[..., :3], rate[..., 3:],
                              acceleration[..., :3], acceleration[..., 3:])

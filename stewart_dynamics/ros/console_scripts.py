@@ -4,7 +4,8 @@
 """
 The console scripts of the nodes; whatever needs no ROS is answered before rclpy is imported.
 
-``--help``, ``--version``, a parameter file that breaks a rule, and that ROS is missing.
+``--help``, ``--version``, ``--example``, a parameter file that breaks a rule, and that ROS is
+missing.
 Signals are handled before anything else is imported.
 """
 
@@ -19,6 +20,9 @@ from stewart_dynamics.ros.signal_flag import SIGNALS
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
+
+
+_EXAMPLE, _WITH_EXAMPLES = '--example', 'stewart_dynamics'  # option, and the node that has it
 
 
 def parameter_files(arguments: Sequence[str]) -> list[str]:
@@ -84,15 +88,43 @@ def trajectory() -> int:
                 'reference_motion.trajectory_node')
 
 
+def printed_request(arguments: Sequence[str], kind: type[ParameterSet]) -> str | None:
+    """
+    Return what a command line asks to print, and nothing else; None: it starts the node.
+
+    Raises ParameterError: the example is not known.
+    """
+    from stewart_dynamics.program import SOFTWARE
+
+    if {'-h', '--help'} & set(arguments):
+        return usage(kind)
+    if '--version' in arguments:
+        return SOFTWARE
+    if _EXAMPLE in arguments and kind.node == _WITH_EXAMPLES:
+        from stewart_dynamics.legs import example
+
+        name = ''.join(arguments[arguments.index(_EXAMPLE) + 1:][:1])
+        return example(name).rstrip('\n')
+    return None
+
+
 def usage(kind: type[ParameterSet]) -> str:
     """Return what ``--help`` prints."""
     return '\n'.join([
         f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]',
+        *([f'       {kind.node} {_EXAMPLE} {"|".join(_example_names())}    print a parameter file '
+           'to begin with'] if kind.node == _WITH_EXAMPLES else []),
         '', 'parameters:',
         *(_described(each) for each in kind.table.values() if each.name not in kind.unused),
         *(['', 'accepted, so that programs can share a file, and not used:',
            f'  {", ".join(name for name in kind.table if name in kind.unused)}']
           if kind.unused else [])])
+
+
+def _example_names() -> tuple[str, ...]:
+    from stewart_dynamics.legs import example_names
+
+    return example_names()
 
 
 def _described(parameter: Parameter) -> str:
@@ -110,16 +142,16 @@ def _run(module: str, name: str, node: str) -> int:
     """Run the node of a module, with the parameters of another one; return its exit code."""
     SIGNALS.watch(end_at_once=True)  # until it is imported: run has its own way
     from stewart_dynamics.errors import ParameterError
-    from stewart_dynamics.program import SOFTWARE, unwritten, written
+    from stewart_dynamics.program import unwritten, written
 
     kind: type[ParameterSet] = getattr(_imported(module), name)
-    if {'-h', '--help', '--version'} & set(sys.argv[1:]):
-        fault = written(usage(kind) if {'-h', '--help'} & set(sys.argv[1:]) else SOFTWARE,
-                        sys.stdout)
-        if fault:
-            print(f'{kind.node}: {unwritten(fault)}', file=sys.stderr)
-        return 1 if fault else 0
     try:
+        text = printed_request(sys.argv[1:], kind)
+        if text is not None:
+            fault = written(text, sys.stdout)
+            if fault:
+                print(f'{kind.node}: {unwritten(fault)}', file=sys.stderr)
+            return 1 if fault else 0
         check_arguments(sys.argv, kind)
         program = _imported(node)
     except ParameterError as exc:
