@@ -400,14 +400,18 @@ static int crank_levers_change(void) {return 1;}
 /* P'' <= |x'|^2 2 max(1, L2 / L1) / L2^2 + 2 (1 / L1 + 1 / L2) |x''|, and between two samples P is
    above their chord less P'' time^2 / 8. */
 static double crank_pieces(
-  const stewart_leg * leg, double lever, double next_lever, joint_bounds most, double time) {
+  const stewart_leg * leg, double lever, double next_lever, const motion_bounds * most,
+  double arm, double time) {
   double size = leg->crank_length, rod = leg->rod_length;
   double a = lever * lever / (size * size), b = next_lever * next_lever / (size * size);
-  double convex = 2.0 * largest(1.0, rod / size) / (rod * rod) * most.velocity * most.velocity +
-    2.0 * crank_steepness(leg) * most.acceleration;
+  double velocity = most->velocity + arm * most->turning;
+  double acceleration = most->acceleration + arm * most->turning_rate;
+  double convex = 2.0 * largest(1.0, rod / size) / (rod * rod) * velocity * velocity +
+    2.0 * crank_steepness(leg) * acceleration;
   double dip = 0.125 * time * time * convex, lowest_known = leg->lever_min * leg->lever_min;
   double lowest_square = largest(least(a, b) - dip, 0.25 * lowest_known);
-  return largest(ceil(sqrt(dip / (DIP * lowest_square))), ceil(fabs(log(a / b)) / RATIO));
+  if (dip <= DIP * lowest_square && a < 2.0 * b && b < 2.0 * a) {return 1.0;}
+  return largest(ceil(sqrt(dip / (DIP * lowest_square))), ceil(fabs(log2(a / b))));
 }
 
 static unsigned crank_unproven(void) {return STEWART_LEVER_MIN;}

@@ -54,9 +54,8 @@ typedef struct {
 } stop_samples;
 
 /* An interval between two samples of a stop has more of them, at most so many in all, where the
-   square of a lever may fall by a part of itself below both, or changes by a factor of exp(RATIO). */
-#define DIP 0.01
-#define RATIO 0.4
+   square of a lever may fall by a part of itself below both, or changes by a factor of 2. */
+#define DIP 0.02
 #define MOST_BETWEEN 64
 
 /* Limits of poses, each of which is checked at poses of its own. */
@@ -67,8 +66,9 @@ enum { DRIVES, ANGLES, CLEARANCES, SINGULARITIES, KINDS };
    the joints [rad]; or the condition number, or more. */
 typedef struct { double lengths[6], levers[6], room[12], condition; } pose_room;
 
-/* Bounds of a platform joint's velocity and acceleration in an interval [m/s, m/s^2]. */
-typedef struct { double velocity, acceleration; } joint_bounds;
+/* Bounds of velocity and acceleration in an interval: of the head [m/s, m/s^2], and of a point by
+   its distance from the head [1/s, 1/s^2]. */
+typedef struct { double velocity, acceleration, turning, turning_rate; } motion_bounds;
 
 /* Of a kind of legs, for the governor:
    margins: give the limits of the drive their margins; returns that of a displacement [m].
@@ -77,7 +77,7 @@ typedef struct { double velocity, acceleration; } joint_bounds;
    moved: of a displacement of the platform joint and the length of its path, the one that counts.
    turn: the most that the line of force turns while the joint moves so far; or infinite.
    levers_change: whether the levers depend on the pose.
-   pieces: of an interval of a time between two samples with levers.
+   pieces: of an interval of a time between two samples with levers; arm: of the platform joint.
    unproven: the limit that is named where the check of a stop does not end. */
 #ifndef STEWART_LIBRARY
 #define STEWART_LIBRARY
@@ -125,11 +125,11 @@ static double turn_of(
 }
 
 static double pieces_of(
-  const stewart_platform * platform, int i, double lever, double next_lever, joint_bounds most,
-  double time) {
+  const stewart_platform * platform, int i, double lever, double next_lever,
+  const motion_bounds * most, double arm, double time) {
   switch (platform->leg_kind) {
     default: STEWART_LEG_KINDS(RETURN, pieces, (
-      &platform->legs[i], lever, next_lever, most, time))
+      &platform->legs[i], lever, next_lever, most, arm, time))
   }
 }
 
@@ -561,22 +561,22 @@ static int overloads(
   return lowest(exceeded);
 }
 
-/* Bounds of the velocity and the acceleration of a platform joint in a time after a state of a
-   stop, whose velocity is (v + b t) exp(-k t). The angular velocity is at most the sum of the rates
-   of the angles, and its rate the sum of theirs and the square of that. */
-static joint_bounds bounds_after(const coordinates * at, double k, double time, double arm) {
-  double velocity = 0.0, acceleration = 0.0, turning = 0.0, change = 0.0;
+/* Bounds in a time after a state of a stop, whose velocity is (v + b t) exp(-k t). The angular
+   velocity is at most the sum of the rates of the angles, and its rate the sum of theirs and the
+   square of that. */
+static motion_bounds bounds_after(const coordinates * at, double k, double time) {
+  motion_bounds most = {0.0, 0.0, 0.0, 0.0};
   for (int i = 0; i < 6; i++) {
     double b = fabs(at->acceleration[i] + k * at->rate[i]);
     double v = fabs(at->rate[i]) + b * time, a = b + k * v;
     if (i < 3) {
-      velocity += v * v, acceleration += a * a;
+      most.velocity += v * v, most.acceleration += a * a;
     } else {
-      turning += v, change += a;
+      most.turning += v, most.turning_rate += a;
     }
   }
-  joint_bounds most = {
-    sqrt(velocity) + turning * arm, sqrt(acceleration) + (change + 2.0 * turning * turning) * arm};
+  most.velocity = sqrt(most.velocity), most.acceleration = sqrt(most.acceleration);
+  most.turning_rate += 2.0 * most.turning * most.turning;
   return most;
 }
 
@@ -592,10 +592,10 @@ static int put_times_between(const governed * on, const stop_samples * stop, dou
     double begin = stop_times[in_order[n]], time = stop_times[in_order[n + 1]] - begin;
     double pieces = 1.0;
     coordinates at = stopped(stop->from, k, begin / k);
+    motion_bounds most = bounds_after(&at, k, time / k);
     for (int i = 0; i < 6; i++) {
-      joint_bounds most = bounds_after(&at, k, time / k, on->limits->arms[i]);
-      pieces = largest(
-        pieces, pieces_of(on->platform, i, levers[i], next_levers[i], most, time / k));
+      pieces = largest(pieces, pieces_of(
+        on->platform, i, levers[i], next_levers[i], &most, on->limits->arms[i], time / k));
     }
     if (!(count + pieces <= MOST_BETWEEN + 1.0)) {return -1;}
     for (int m = 1; m < (int)pieces; m++) {times[count++] = (begin + time * (m / pieces)) / k;}

@@ -298,8 +298,9 @@ static double telescopic_turn(
 static int telescopic_levers_change(void) {return 0;}
 
 static double telescopic_pieces(
-  const stewart_leg * leg, double lever, double next_lever, joint_bounds most, double time)
-{(void)leg, (void)lever, (void)next_lever, (void)most, (void)time; return 1.0;}
+  const stewart_leg * leg, double lever, double next_lever, const motion_bounds * most,
+  double arm, double time)
+{(void)leg, (void)lever, (void)next_lever, (void)most, (void)arm, (void)time; return 1.0;}
 
 static unsigned telescopic_unproven(void) {return STEWART_LENGTH_MIN;}
 

@@ -173,6 +173,11 @@ class GovernedStream:
         return Motion.of_rows(rows)
 
     @property
+    def stop_rate(self) -> float:
+        """Return k of its stops, v'' + 2 k v' + k^2 v = 0 [1/s]."""
+        return float(self._governor.limits['stop_rate'])
+
+    @property
     def held(self) -> dict[str, float]:
         """Return the time by which each limit has held the demand back [s], all axes together."""
         return self._governor.held_times(self._stream['governor'])
