@@ -18,11 +18,12 @@ limits: one share of all six coordinates first, then each of them alone. A share
 with the stop that was checked before: there is always a next state. A share falls as it must, and
 grows in a quarter of a second; where the deviation has vanished, the motion is the demand itself.
 
-Lengths, angles, clearance and condition number are within their limits at each pose of a stop:
-from one pose that is checked to the next one, no point moves farther than the room of both (the
-conservative advancement of collision detection: B. Mirtich, Impulse-based Dynamic Simulation,
-Berkeley, 1996). Rates, forces and torques are checked at 16 samples of it; between these they
-exceed the bounds by less than the margins with which they are checked.
+Lengths, angles, levers, clearance and condition number are within their limits at each pose of a
+stop: from one pose that is checked to the next one, no point moves farther than the room of both
+(the conservative advancement of collision detection: B. Mirtich, Impulse-based Dynamic Simulation,
+Berkeley, 1996). Rates, forces and torques are checked at 16 samples of it, and at more of them
+where levers may change faster; between these they exceed the bounds by less than the margins with
+which they are checked. The bounds of cranks, and why each state has a stop: docs/motion_cueing.md.
 
 A stream may demand anything. Where rates and accelerations are not those of its poses, they are
 taken from differences; where the hexapod cannot follow these, the demand has jumped, and the
