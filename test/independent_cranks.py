@@ -137,7 +137,8 @@ def _cranks(p: Parameters, motion: Motion) -> Cranks:
     spin = np.einsum('nij,nj->ni', tensor, w)
     couple = (np.einsum('nij,nj->ni', tensor, alpha) + np.cross(w, spin) + np.cross(com, force))
     rows = np.concatenate([d, np.cross(arm, d)], axis=-1)
-    needed = np.concatenate([force - across.sum(1), couple - np.cross(arm, across).sum(1)], axis=-1)
+    needed = np.concatenate([
+        force - across.sum(1), couple - np.cross(arm, across).sum(1)], axis=-1)
     bad = ~np.isfinite(rows).all(axis=(1, 2)) | ~np.isfinite(needed).all(axis=1)
     rows[bad] = np.eye(6)
     push = np.linalg.solve(np.swapaxes(rows, -1, -2), needed[..., None])[..., 0]

@@ -51,7 +51,7 @@ class _Legs(NamedTuple):
 
 
 class _Drives(NamedTuple):
-    """Drives of a motion (N, 6): rates and efforts with what they move; turns of the motors."""
+    """Rates and efforts of the drives (N, 6), inertia of each, and turns of its motor by its own."""
 
     rates: Array
     accelerations: Array

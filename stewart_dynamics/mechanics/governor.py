@@ -103,7 +103,7 @@ class Governor:
         return None if limit == 0 else self.kept[limit - 1]
 
     def held_times(self, state: Records) -> dict[str, float]:
-        """Return the time by which each limit has held the demand back [s], of a governor_state."""
+        """Return the time by which each limit of a state has held the demand back [s]."""
         held = state['held'].tolist()
         return {limit: held[place] for place, limit in self.kept.items()}
 
