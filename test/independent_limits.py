@@ -51,7 +51,7 @@ class _Legs(NamedTuple):
 
 
 class _Drives(NamedTuple):
-    """Rates and efforts of the drives (N, 6), inertia of each, and turns of its motor by its own."""
+    """Rates and efforts of the drives (N, 6), inertia of each, turns of its motor by its own."""
 
     rates: Array
     accelerations: Array

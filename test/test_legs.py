@@ -375,8 +375,9 @@ def with_pantographs(folder: Path) -> list[str]:
             text = text.replace(behind, behind + added)
         (package / name).write_text(text, encoding='utf-8')
     # The functions of a kind that do not differ from those of telescopic legs.
-    asked = {function for file in ('stewart_dynamics.c', 'legs.c', 'governor.c') for function in re.findall(
-        r'STEWART_LEG_KINDS\(\w+, (\w+), \(', (package / 'core' / file).read_text())}
+    asked = {function for file in ('stewart_dynamics.c', 'legs.c', 'governor.c')
+             for function in re.findall(
+                 r'STEWART_LEG_KINDS\(\w+, (\w+), \(', (package / 'core' / file).read_text())}
     same = sorted(asked - set(re.findall(r'\bpantograph_(\w+)\(', C_FILE)))
     assert 'position' in asked and 'check' in same
     (package / 'core' / 'pantograph.h').write_text(C_FILE + ''.join(
