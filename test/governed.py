@@ -232,8 +232,10 @@ def random_demand(random: np.random.Generator, kind: str, p: Parameters, samples
             (q, v, a)[random.integers(3)][n, random.integers(3)] = 10.0 ** random.uniform(0, 308)
     if kind == 'out of reach':
         q[:, :3] += np.linspace(0.0, 3.0 * size, samples)[:, None] * random.normal(size=3)
+    cut = (samples if p['legs.crank.length'] is None
+           else int(random.integers(samples // 4, samples)))
     if kind == 'cut':
-        q[int(random.integers(samples // 4, samples)):, :3] = 1e12  # not followed: a stop
+        q[cut:, :3] = 1e12  # is not followed: the motion stops
     q[:, 3:] = np.clip(q[:, 3:], -3.0, 3.0)
     if kind == 'lost':
         keep = random.random(samples) < 0.9
@@ -246,7 +248,6 @@ def random_demand(random: np.random.Generator, kind: str, p: Parameters, samples
     if kind == 'not a number':
         motion = Motion.of_rows(motion.rows.copy())  # from_euler would reject them
         motion.rows[random.random(samples) < 0.02, random.integers(24)] = np.nan
-        cut = int(random.integers(samples // 4, samples))
         motion.rows[cut:cut + random.integers(samples)] = np.nan
     return times, motion
 
