@@ -263,7 +263,7 @@ def _euler_rates(angles: Array) -> Array:
 
 def stops(p: Parameters, motion: Motion, rate: float, parts: Array) -> Motion:
     """
-    Return the stops (N * M,) from states (N,) of a motion, at times parts / rate (M,).
+    Return the stops from states of a motion (N,), N * M samples at M times parts / rate.
 
     Each coordinate's velocity follows v'' + 2 k v' + k^2 v = 0. The coordinates are position, and
     angles of R = Rz Ry Rx in the axes of home; their rates come from w = E angles'.
