@@ -23,7 +23,8 @@ stop: from one pose that is checked to the next one, no point moves farther than
 (the conservative advancement of collision detection: B. Mirtich, Impulse-based Dynamic Simulation,
 Berkeley, 1996). Rates, forces and torques are checked at 16 samples of it, and at more of them
 where levers may change faster; between these they exceed the bounds by less than the margins with
-which they are checked. The bounds of cranks, and why each state has a stop: docs/motion_cueing.md.
+which they are checked. Bounds by the kind of legs, and why each state has a stop:
+docs/motion_cueing.md.
 
 A stream may demand anything. Where rates and accelerations are not those of its poses, they are
 taken from differences; where the hexapod cannot follow these, the demand has jumped, and the
