@@ -113,7 +113,7 @@ demo: $(INSTALLED)
 	@$(VENV)/bin/python demo/demo.py
 
 demo-cueing: $(INSTALLED)
-	@$(VENV)/bin/python demo/cueing.py
+	@$(VENV)/bin/python demo/cueing.py $(if $(LEGS),--legs $(LEGS))
 
 # LEGS=crank: six gear motors with cranks in place of telescopic legs.
 demo-loop: $(INSTALLED)

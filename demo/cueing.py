@@ -27,9 +27,11 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / 'examples'))
 from town_drive import drive  # noqa: E402, I100, I202
 
-# Gains that use the hexapod of config/platform.yaml on this drive.
-GAINS = {'cueing.translation.gain': [0.9, 1.0, 1.0], 'cueing.tilt.gain': [1.0, 1.0],
-         'cueing.rotation.gain': [1.0, 1.0, 1.0]}
+# By the kind of legs: the hexapod, and gains that use it on this drive, translation, tilt and
+# rotation.
+HEXAPODS = {
+    'telescopic': ('platform.yaml', [0.9, 1.0, 1.0], [1.0, 1.0], [1.0, 1.0, 1.0]),
+    'crank': ('crank_platform.yaml', [0.42, 0.41, 1.0], [1.0, 0.72], [1.0, 1.0, 0.42])}
 WANTED, FELT = '#0072b2', '#d55e00'
 CURVES = ((0, 'surge [m/s²]'), (1, 'sway [m/s²]'), (2, 'heave [m/s²]'), (5, 'yaw [rad/s]'))
 
@@ -39,8 +41,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--output', type=Path, default=Path('motion_cueing.png'), metavar='FILE',
                         help='the picture (default: %(default)s)')
-    output = parser.parse_args().output
-    parameters = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced(GAINS)
+    parser.add_argument('--legs', choices=HEXAPODS, default='telescopic',
+                        help='legs of the hexapod (default: %(default)s)')
+    options = parser.parse_args()
+    output = options.output
+    file, translation, tilt, rotation = HEXAPODS[options.legs]
+    parameters = Parameters.from_yaml(ROOT / 'config' / file).replaced({
+        'cueing.translation.gain': translation, 'cueing.tilt.gain': tilt,
+        'cueing.rotation.gain': rotation})
     vehicle = RecordedVehicle(*drive())
     begun = time.perf_counter()
     found = cued(MotionCueing(parameters), vehicle)

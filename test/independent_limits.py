@@ -5,15 +5,17 @@
 The limits of a hexapod checked without this package: which samples of a motion exceed which.
 
 Lengths, angles, clearances, condition numbers and motors are computed here with numpy; forces are
-those of ``independent_hexapod``. Only Parameters and Motion, which carry the numbers, are the
-package's. Screws are guided, and a base is at rest.
+those of ``independent_hexapod``, cranks are those of ``independent_cranks``. Only Parameters and
+Motion, which carry the numbers, are the package's. Screws are guided, and a base is at rest.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import combinations
 from typing import NamedTuple
 
+from independent_cranks import Cranks, cranks
 from independent_hexapod import moving
 import numpy as np
 from numpy.typing import NDArray
@@ -48,9 +50,26 @@ class _Legs(NamedTuple):
         return self.ends - self.begins
 
 
-def _legs(p: Parameters, motion: Motion) -> _Legs:
+class _Drives(NamedTuple):
+    """Rates and efforts of the drives (N, 6), inertia of each, turns of its motor by its own."""
+
+    rates: Array
+    accelerations: Array
+    efforts: Array
+    inertia: Array
+    ratio: Array
+
+
+def _of_cranks(p: Parameters, motion: Motion) -> Cranks | None:
+    return None if p['legs.crank.length'] is None else cranks(p, motion)
+
+
+def _legs(p: Parameters, motion: Motion, of_cranks: Cranks | None = None) -> _Legs:
+    """Return the lines of force, of telescopic legs from their base joints, else the rods."""
     arms = np.einsum('nij,kj->nki', motion.rotation, p['geometry.platform_joints'])
-    begins = np.broadcast_to(p['geometry.base_joints'], arms.shape)
+    found = of_cranks or _of_cranks(p, motion)
+    begins = (np.broadcast_to(p['geometry.base_joints'], arms.shape) if found is None
+              else found.ends)
     return _Legs(begins, motion.position[:, None] + arms, arms)
 
 
@@ -137,21 +156,24 @@ def clearances(p: Parameters, motion: Motion) -> Array:
     return found
 
 
-def joint_angles(p: Parameters, motion: Motion, axes: Array) -> tuple[Array, Array]:
+def joint_angles(p: Parameters, motion: Motion, axes: Array, of_cranks: Cranks | None = None,
+                 ) -> tuple[Array, Array]:
     """Return angles (N, 6) of the joints of base and platform by axes (2, 6, 3) [rad]."""
-    legs = _legs(p, motion).directions
+    legs = _legs(p, motion, of_cranks).directions
     turned = np.einsum('nij,kj->nki', motion.rotation, axes[1])
     return (np.arccos(np.clip((legs * axes[0]).sum(-1), -1.0, 1.0)),
             np.arccos(np.clip((legs * turned).sum(-1), -1.0, 1.0)))
 
 
-def conditions(p: Parameters, motion: Motion) -> tuple[Array, Array]:
-    """Return condition numbers (N,) and determinants (N,) of J_inv."""
-    legs = _legs(p, motion)
+def conditions(p: Parameters, motion: Motion, of_cranks: Cranks | None = None,
+               ) -> tuple[Array, Array]:
+    """Return condition numbers (N,) and determinants (N,) of J_inv; nan where a rod is short."""
+    legs = _legs(p, motion, of_cranks)
     moments = np.cross(legs.arms, legs.directions) / p['singularity.characteristic_length']
     rows = np.concatenate([legs.directions, moments], axis=-1)
-    values = np.linalg.svd(rows, compute_uv=False)
-    with np.errstate(divide='ignore'):
+    known = np.isfinite(rows).all(axis=(1, 2))
+    values = np.linalg.svd(np.where(known[:, None, None], rows, 0.0), compute_uv=False)
+    with np.errstate(divide='ignore', invalid='ignore'):
         return values[:, 0] / values[:, -1], np.linalg.det(rows)
 
 
@@ -171,47 +193,48 @@ def exceedances(p: Parameters, motion: Motion, axes: Array) -> dict[str, Flags]:
             within: Flags = np.abs(values) <= np.asarray(bounds) * (1.0 + TOLERANCE)
             found[name] = np.any(~within.reshape(len(motion), -1), axis=1)
 
-    legs = moving(p, motion)
-    geometry = _legs(p, motion)
-    rates = np.einsum('nki,nki->nk', geometry.directions, motion.linear_velocity[:, None]
-                      + np.cross(motion.angular_velocity[:, None], geometry.arms))
-    most('limits.length_max', geometry.lengths)
-    most('limits.velocity_max', rates)
-    if p['limits.length_min'] is not None:
-        short: Flags = geometry.lengths < p['limits.length_min'] * (1.0 - TOLERANCE)
-        found['limits.length_min'] = np.any(short, axis=1)
-    most('limits.force_max', legs.forces)
-    mass, viscous, coulomb, near = (np.broadcast_to(p[f'actuator.{name}'], 6) for name in (
-        'reflected_mass', 'viscous_friction', 'coulomb_friction', 'coulomb_velocity'))
-    turning = np.cross(motion.angular_velocity[:, None], geometry.arms)
-    joint_acceleration = (
-        motion.linear_acceleration[:, None]
-        + np.cross(motion.angular_acceleration[:, None], geometry.arms)
-        + np.cross(motion.angular_velocity[:, None], turning))
-    velocity = motion.linear_velocity[:, None] + turning
-    accelerations = (geometry.directions * joint_acceleration).sum(-1) + (
-        (velocity * velocity).sum(-1) - rates ** 2) / geometry.lengths
-    friction = viscous * rates + coulomb * np.clip(rates / near, -1.0, 1.0)
-    most('limits.joint_force_max', legs.forces - mass * accelerations - friction)
+    def least(name: str, values: Array) -> None:
+        if p[name] is not None:
+            short: Flags = ~(values >= p[name] - TOLERANCE * np.abs(p[name]))
+            found[name] = np.any(short, axis=1)
+
+    of_cranks = _of_cranks(p, motion)
+    if of_cranks is None:
+        drives = _check_telescopic(p, motion, most, least)
+    else:
+        # a limit of angles has a sign, and levers of the wrong branch are negative
+        ends = p['limits.angle_max']
+        if ends is not None:
+            found['limits.angle_max'] = np.any(
+                ~(of_cranks.angles <= ends + TOLERANCE * np.abs(ends)), axis=1)
+        least('limits.angle_min', of_cranks.angles)
+        least('limits.lever_min', of_cranks.ratios)
+        most('limits.speed_max', of_cranks.speeds)
+        most('limits.torque_max', of_cranks.torques)
+        most('limits.rod_force_max', of_cranks.rod_forces)
+        drives = _Drives(of_cranks.speeds, of_cranks.accelerations, of_cranks.torques,
+                         np.broadcast_to(p['actuator.reflected_inertia'], 6),
+                         np.broadcast_to(p['drive.gear_ratio'], 6))
     if p['limits.base_joint_angle_max'] is not None or (
             p['limits.platform_joint_angle_max'] is not None):
-        base, platform = joint_angles(p, motion, axes)
+        base, platform = joint_angles(p, motion, axes, of_cranks)
         most('limits.base_joint_angle_max', base)
         most('limits.platform_joint_angle_max', platform)
     if p['limits.leg_clearance_min'] is not None:
         least = p['limits.leg_clearance_min']
         found['limits.leg_clearance_min'] = clearances(p, motion) < least - TOLERANCE * abs(least)
-    condition, determinant = conditions(p, motion)
-    found['singularity'] = ~(condition < p['singularity.stop_condition']) | (
-        determinant * determinant[0] <= 0.0)
-    if p['actuator.screw_lead'] is not None:
-        ratio = 2.0 * np.pi * p['drive.gear_ratio'] / p['actuator.screw_lead']
+    condition, determinant = conditions(p, motion, of_cranks)
+    found['singularity'] = ~(condition < p['singularity.stop_condition']) | ~(
+        determinant * determinant[0] > 0.0)
+    if drives is not None:
+        rates, accelerations, efforts, mass, ratio = drives
+        near = np.broadcast_to(p['actuator.coulomb_velocity'], 6)
         speeds = ratio * rates
         most('drive.speed_max', speeds)
         efficiency = np.broadcast_to(p['drive.efficiency'], 6)
         back = p['drive.back_driving_efficiency']
         back = 2.0 - 1.0 / efficiency if back is None else back
-        through = (legs.forces - mass * accelerations) / ratio
+        through = (efforts - mass * accelerations) / ratio
         inertial = mass / ratio * accelerations
         # losses are linear in the rate near standstill, as friction is
         share = np.clip(np.abs(rates) / near, 0.0, 1.0)
@@ -229,3 +252,32 @@ def exceedances(p: Parameters, motion: Motion, axes: Array) -> dict[str, Flags]:
         most('drive.torque_speed', torques, available)
         most('drive.torque_max', torques)
     return found
+
+
+def _check_telescopic(p: Parameters, motion: Motion, most: Callable[[str, Array], None],
+                      least: Callable[[str, Array], None]) -> _Drives | None:
+    """Check the limits of lengths, rates and forces; return the drives, None without screws."""
+    legs = moving(p, motion)
+    geometry = _legs(p, motion)
+    rates = np.einsum('nki,nki->nk', geometry.directions, motion.linear_velocity[:, None]
+                      + np.cross(motion.angular_velocity[:, None], geometry.arms))
+    most('limits.length_max', geometry.lengths)
+    most('limits.velocity_max', rates)
+    least('limits.length_min', geometry.lengths)
+    most('limits.force_max', legs.forces)
+    mass, viscous, coulomb, near = (np.broadcast_to(p[f'actuator.{name}'], 6) for name in (
+        'reflected_mass', 'viscous_friction', 'coulomb_friction', 'coulomb_velocity'))
+    turning = np.cross(motion.angular_velocity[:, None], geometry.arms)
+    joint_acceleration = (
+        motion.linear_acceleration[:, None]
+        + np.cross(motion.angular_acceleration[:, None], geometry.arms)
+        + np.cross(motion.angular_velocity[:, None], turning))
+    velocity = motion.linear_velocity[:, None] + turning
+    accelerations = (geometry.directions * joint_acceleration).sum(-1) + (
+        (velocity * velocity).sum(-1) - rates ** 2) / geometry.lengths
+    friction = viscous * rates + coulomb * np.clip(rates / near, -1.0, 1.0)
+    most('limits.joint_force_max', legs.forces - mass * accelerations - friction)
+    if p['actuator.screw_lead'] is None:
+        return None
+    ratio = np.broadcast_to(2.0 * np.pi * p['drive.gear_ratio'] / p['actuator.screw_lead'], 6)
+    return _Drives(rates, accelerations, legs.forces, mass, ratio)

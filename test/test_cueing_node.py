@@ -19,7 +19,7 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 from running import Inside, nanoseconds, Peer, PLATFORM
 from sensor_msgs.msg import Imu, JointState
-from stewart_dynamics import Parameters
+from stewart_dynamics import Parameters, Pose
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.cueing.cueing_node import CueingNode
 from stewart_dynamics.cueing.motion_cueing import GRAVITY, MotionCueing
@@ -41,7 +41,7 @@ QUICK = 'start_timeout:=0.1', 'cueing.translation.washout_frequency:=[1.25, 2.0,
 class Cueing:
     """The node in this process, a vehicle and a listener."""
 
-    def __init__(self, domain: int, *overrides: str) -> None:
+    def __init__(self, domain: int, *overrides: str, file: Any = PLATFORM) -> None:
         self.peer = Peer(domain)
         self.raw = {name: self.peer.listen(f'/stewart_dynamics/setpoint/{name}', kind)
                     for name, kind in KINDS.items()}
@@ -54,7 +54,7 @@ class Cueing:
         self._decoded, self._last = 0, np.full(9, np.inf)
         nodes: list[CueingNode] = []
         self.program: Any = Inside(lambda: nodes.append(CueingNode()) or nodes[0], [
-            '--ros-args', '--params-file', PLATFORM, '-p', f'cueing.rate:={RATE}',
+            '--ros-args', '--params-file', str(file), '-p', f'cueing.rate:={RATE}',
             *(part for each in overrides for part in ('-p', each))], domain)
         self.node = nodes[0]
 
@@ -129,8 +129,8 @@ def cueing(domain: int) -> Iterator[Any]:
     """Give a function that starts the node."""
     made = []
 
-    def start(*overrides: str) -> Cueing:
-        made.append(Cueing(domain, *overrides))
+    def start(*overrides: str, **changes: Any) -> Cueing:
+        made.append(Cueing(domain, *overrides, **changes))
         return made[-1]
 
     yield start
@@ -171,6 +171,47 @@ def test_begins_with_the_approach_from_the_measured_legs(cueing: Any) -> None:
     np.testing.assert_allclose(rows[0, :3], pose, atol=1e-9)
     assert np.abs(np.diff(rows[:, 2])).max() < 0.01
     np.testing.assert_allclose(rows[-1, 3:], 0.0, atol=1e-9)
+
+
+def test_it_does_not_start_without_an_approach(cueing: Any) -> None:
+    """From a measured pose outside the limits: not from home either, where it is not."""
+    node = cueing('start_timeout:=1.0', 'limits.length_min:=[0.95]')
+    pose = HOME.position - [0.0, 0.0, 0.5]
+    lengths = StewartPlatform(PARAMETERS).inverse_kinematics(type(HOME)(pose, HOME.rotation))
+    legs = JointState(name=list(PARAMETERS['joints']),
+                      position=(lengths - PARAMETERS['geometry.zero_length']).tolist())
+    assert lengths.min() < 0.95
+    node.until(lambda: node.legs.publish(legs) or node.diagnostics and (
+        'no approach to the home pose: ' in node.status.message), 'it says so')
+    reports = len(node.diagnostics)
+    node.until(lambda: len(node.diagnostics) > reports + 1, 'time passes')
+    assert not node.raw['accel']
+
+
+def test_cranks_are_moved_within_their_limits(cueing: Any) -> None:
+    """A push that they cannot follow: diagnostics name the limit that holds it back."""
+    file = PLATFORM.with_name('crank_platform.yaml')
+    p = Parameters.from_yaml(file)
+    home = home_pose(p)
+    node = cueing('start_timeout:=0.1', 'cueing.translation.gain:=[2.0, 2.0, 2.0]', file=file)
+    values: dict[str, str] = {}
+
+    def held_back() -> bool:
+        values.update((pair.key, pair.value) for pair in (
+            node.status.values if node.diagnostics else []))
+        return 'held back by angle_max (%)' in values
+
+    node.until(held_back, 'it is held back', (6.0, 0.0, GRAVITY))
+    _, rows = node.rows()
+    assert rows[:, 0].max() > home.position[0] + 0.1
+    poses = [deserialize_message(data, PoseStamped).pose for data in node.raw['pose']]
+    motion = Pose.from_quaternion(
+        [[getattr(each.position, c) for c in 'xyz'] for each in poses],
+        [[getattr(each.orientation, c) for c in 'xyzw'] for each in poses])
+    angles = StewartPlatform(p).inverse_kinematics(motion)
+    assert (angles <= p.limits.angle_max).all() and (angles >= p.limits.angle_min).all()
+    assert (np.abs(np.diff(angles, axis=0)) * RATE <= p.limits.speed_max).all()
+    assert not any('length' in key or 'force_max' in key for key in values)
 
 
 def test_in_simulated_time_setpoints_are_due_by_the_clock(cueing: Any) -> None:

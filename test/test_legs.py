@@ -164,6 +164,36 @@ static int pantograph_given(const stewart_leg * leg) {return leg->pantograph_rat
 
 #endif
 
+#elif defined STEWART_GOVERNOR
+
+/* Limits of the lengths. */
+static stewart_leg pantograph_alone(const stewart_leg * leg) {
+  stewart_leg alone = *leg;
+  alone.length_min /= leg->pantograph_ratio, alone.length_max /= leg->pantograph_ratio;
+  return alone;
+}
+
+static double pantograph_margins(double size, stewart_leg * leg) {
+  stewart_leg alone = pantograph_alone(leg);
+  double margin = telescopic_margins(size, &alone);
+  leg->length_min = alone.length_min * leg->pantograph_ratio;
+  leg->length_max = alone.length_max * leg->pantograph_ratio, leg->force_max = alone.force_max;
+  return margin;
+}
+
+static unsigned pantograph_put_room(
+  const stewart_leg * leg, double margin, const stewart_motion * motion, double length,
+  double * room) {
+  stewart_leg alone = pantograph_alone(leg);
+  length = telescopic_line(leg, motion->position, motion->rotation).length;
+  return telescopic_put_room(&alone, margin, motion, length, room);
+}
+
+/* At most: the length may be the position of the drive. */
+static double pantograph_turn(
+  const stewart_leg * leg, double margin, double length, double lever, double moved)
+{return telescopic_turn(leg, margin, length / leg->pantograph_ratio, lever, moved);}
+
 #else
 
 static double pantograph_position(
@@ -217,6 +247,7 @@ EDITS = {
         ('/* where the published position is zero [m] */\n', '  double pantograph_ratio;\n')],
     'core/stewart_dynamics.c': [('#include "crank.h"\n', '#include "pantograph.h"\n')],
     'core/legs.c': [('#include "crank.h"\n', '#include "pantograph.h"\n')],
+    'core/governor.c': [('#include "crank.h"\n', '#include "pantograph.h"\n')],
     'legs/__init__.py': [
         ('from stewart_dynamics.legs.kind import LegKind\n',
          'from stewart_dynamics.legs.pantograph import PANTOGRAPH\n'),
@@ -229,7 +260,8 @@ PROGRAM = """
 import sys
 
 import numpy as np
-from stewart_dynamics import BaseMotion, Motion, ParameterError, Parameters, StewartPlatform
+from stewart_dynamics import (
+    BaseMotion, GovernedStream, Motion, ParameterError, Parameters, StewartPlatform)
 from stewart_dynamics.legs import KINDS
 from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters
 from stewart_dynamics.setpoints.step import Batch, Step
@@ -282,6 +314,13 @@ near(rows, motion.linear_acceleration)
 # The step of node and replay: the limits are those of the drive.
 outputs = Step(doubled.replaced({'limits.force_max': 100.0}))(Batch.of(0, motion[0].rows))
 assert np.abs(outputs.records['forces']).max() <= 100.0
+# The governor keeps them, too.
+stream = GovernedStream(doubled)
+away = home.position + np.outer(np.arange(1000) > 100, [0.0, 0.0, 2.0])
+governed = stream.advance(0.004 * np.arange(1000), Motion(away, [home.rotation] * 1000))
+longest = two.inverse_kinematics(governed).max()
+assert 0.985 * doubled.limits.length_max[0] < longest < doubled.limits.length_max[0], longest
+assert stream.held['limits.length_max'] > 0.1
 # Copies, files and wrong names.
 doubled.to_yaml(sys.argv[1])
 assert Parameters.from_yaml(sys.argv[1]) == doubled
@@ -310,8 +349,9 @@ def with_pantographs(folder: Path) -> list[str]:
             text = text.replace(behind, behind + added)
         (package / name).write_text(text, encoding='utf-8')
     # The functions of a kind that do not differ from those of telescopic legs.
-    asked = {function for file in ('stewart_dynamics.c', 'legs.c') for function in re.findall(
-        r'STEWART_LEG_KINDS\(\w+, (\w+), \(', (package / 'core' / file).read_text())}
+    asked = {function for file in ('stewart_dynamics.c', 'legs.c', 'governor.c')
+             for function in re.findall(
+                 r'STEWART_LEG_KINDS\(\w+, (\w+), \(', (package / 'core' / file).read_text())}
     same = sorted(asked - set(re.findall(r'\bpantograph_(\w+)\(', C_FILE)))
     assert 'position' in asked and 'check' in same
     (package / 'core' / 'pantograph.h').write_text(C_FILE + ''.join(

@@ -10,7 +10,9 @@ from pathlib import Path
 import subprocess
 from typing import Any, NamedTuple
 
-from governed import Array, DEMANDS, KINDS, limited_hexapod, random_demand
+from governed import (
+    Array, CRANK_DEMANDS, CRANK_KINDS, CRANKS, DEMANDS, KINDS, limited_cranks, limited_hexapod,
+    random_demand)
 from independent_limits import exceedances
 from messages import imu
 import numpy as np
@@ -125,6 +127,32 @@ def test_no_limit_is_exceeded_by_any_setpoint(program: Path, wanted: str) -> Non
     assert checked > (9_000 if wanted == 'lost' else 15_400)  # 10^5 of all demands
 
 
+@pytest.mark.parametrize('kind', CRANK_KINDS)
+def test_no_limit_of_cranks_is_exceeded_by_any_setpoint(program: Path, kind: str) -> None:
+    """Each kind of limit, with a third of the demands; they have the bits of Python's."""
+    place = CRANK_KINDS.index(kind)
+    random = np.random.default_rng([8, place])
+    for wanted in CRANK_DEMANDS[place % 3:-1:3]:  # without numbers that are not finite
+        while True:
+            try:
+                p, axes = limited_cranks(random, kind)
+                GovernedStream(p)
+                break
+            except ParameterError:  # home is not within such limits
+                continue
+        stamps, demand = from_home(p, *random_demand(random, wanted, p, 200))
+        numbers, demand = to_references(demand)
+        found, motion = governed(program, p, stamps, numbers)
+        expected = GovernedStream(p, demand[0]).advance(1e-9 * stamps, demand)
+        assert motion.rows.tobytes() == expected.rows.tobytes(), wanted
+        exceeded = exceedances(p, motion, axes)
+        assert {name for name, wrong in exceeded.items() if wrong.any()} == set(), wanted
+        assert (found['code'] == CODES['STEWART_OK']).all()
+        result = StewartPlatform(p).inverse_dynamics(motion)
+        assert np.array_equal(found['positions'], result.angles)
+        assert np.array_equal(found['efforts'], result.torques)
+
+
 HEXAPOD = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 
 
@@ -207,7 +235,22 @@ def test_a_gap_of_the_cycles_is_no_jump(program: Path) -> None:
      'base.imu.orientation: must be a unit quaternion')])
 def test_rules_in_one_line(program: Path, changes: dict[str, Any], message: str) -> None:
     """A rule that is broken is named, and nothing is computed."""
-    given = as_text(HEXAPOD, {'reference': 'platform', 'governor': True, **changes})
+    assert_rule(program, HEXAPOD, changes, message)
+
+
+@pytest.mark.parametrize(('changes', 'message'), [
+    ({'limits.torque_max': [40.0]}, 'governor: at home limits.torque_max is exceeded, or nearer '
+     'than the margin of the governor'),
+    ({'limits.lever_min': [0.9]}, 'governor: at home limits.lever_min is exceeded, or nearer than '
+     'the margin of the governor'),
+    ({'legs.rod.length': [0.1], 'geometry.crank_branch': ['positive']}, 'home pose: no level pose '
+     "has all rods at the cranks' middle angles: needed by governor")])
+def test_rules_of_cranks_in_one_line(program: Path, changes: dict[str, Any], message: str) -> None:
+    assert_rule(program, CRANKS, changes, message)
+
+
+def assert_rule(program: Path, p: Parameters, changes: dict[str, Any], message: str) -> None:
+    given = as_text(p, {'reference': 'platform', 'governor': True, **changes})
     done = subprocess.run([program], input=given + '0 1', capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (1, '', f'{message}\n')
 

@@ -60,7 +60,8 @@ typedef struct { double value[6], rate[6], acceleration[6]; } coordinates;
 enum { GOVERNED_SINGULARITY = 24 };
 
 /* What a governor keeps besides the limits of the platform's legs: see mechanics/governor.py. All
- * have its margins, which stand here by themselves for lengths, clearance [m] and angles [rad]. */
+ * have its margins, which stand here by themselves for positions of drives, as displacements of the
+ * platform joints, clearance [m] and angles of joints [rad]. */
 typedef struct {
   stewart_pose home;
   double head[3];                     /* platform frame [m] */
@@ -70,7 +71,7 @@ typedef struct {
   double stop_condition;              /* without a margin */
   double arms[6], radii[6], reach;    /* distances of platform joints from the head, and from the
                                          origin; of the farthest part from the head [m] */
-  double length_margin[6], base_angle_margin[6], platform_angle_margin[6], clearance_margin;
+  double drive_margin[6], base_angle_margin[6], platform_angle_margin[6], clearance_margin;
 } governor_limits;
 
 /* A governed motion, all zero at rest at home; following: it is the demand. */

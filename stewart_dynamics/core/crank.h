@@ -331,6 +331,101 @@ static int crank_check(const stewart_platform * platform, const stewart_leg * le
 
 #endif
 
+#elif defined STEWART_GOVERNOR
+
+/* With the ratio P = (k / L1)^2, |grad P| <= 2 sqrt(1 - P) (1 / L1 + 1 / L2) for a displacement of
+   the platform joint: the sine of the angle between the rod and the direction in which the crank's
+   end moves, sqrt(1 - P), changes by at most this number times the displacement: docs/cranks.md. */
+static double crank_steepness(const stewart_leg * leg)
+{return 1.0 / leg->crank_length + 1.0 / leg->rod_length;}
+
+static double crank_sine(double ratio) {return sqrt(largest(1.0 - ratio * ratio, 0.0));}
+
+/* The angle is within pi of home_position: past that it would jump by a turn. The margin is one of
+   displacements of the platform joint: the lever falls with the root of the distance from the end
+   of reach. */
+static double crank_margins(double size, stewart_leg * leg) {
+  (void)size;
+  leg->angle_min = largest(leg->angle_min, leg->home_position - PI);
+  leg->angle_max = least(leg->angle_max, leg->home_position + PI);
+  double range = least(leg->angle_max - leg->angle_min, PI);
+  double margin = OF_STROKE * 2.0 * leg->crank_length * sin(0.5 * range);
+  double sine = crank_sine(leg->lever_min) - margin * crank_steepness(leg);
+  leg->lever_min = crank_sine(largest(sine, 0.0));
+  leg->crank_torque_max -= 2.0 * leg->coulomb_friction;  /* its sign may change between samples */
+  return margin;
+}
+
+static double crank_stop_rate(const stewart_leg * leg) {
+  double rate = leg->crank_speed_max / (leg->angle_max - leg->angle_min);
+  return isfinite(leg->crank_speed_max) && rate > 0.0 ? rate : (double)NAN;
+}
+
+/* Distance of a platform joint from those at which the crank has an angle: half a sphere about the
+   end of the crank [m]. */
+static double crank_distance(const stewart_leg * leg, double position, vector joint) {
+  vector anchor, z = read3(leg->crank_direction), n0 = cross(read3(leg->crank_axis), z);
+  double rod = crank_anchor(leg, position, &anchor);
+  vector n = subtract(scale(cos(position), n0), scale(sin(position), z));
+  vector from = subtract(joint, anchor);
+  double length = norm(from), height = leg->branch * dot(from, n);
+  double radius = sqrt(largest(length * length - height * height, 0.0));
+  return height >= 0.0 ? fabs(length - rod) : hypot(height, radius - rod);
+}
+
+static unsigned crank_put_room(
+  const stewart_leg * leg, double margin, const stewart_motion * motion, double length,
+  double * room) {
+  crank_pose at = crank_pose_of(leg, motion->position, motion->rotation);
+  double ratio = crank_lever_ratio(leg, at.line.lever), position = crank_angle(leg, &at);
+  vector joint = add(read3(motion->position), at.line.arm);
+  (void)length;
+  if (!(ratio >= leg->lever_min)) {return STEWART_LEVER_MIN;}
+  *room = (crank_sine(leg->lever_min) - crank_sine(ratio)) / crank_steepness(leg);
+  double low = crank_distance(leg, leg->angle_min, joint) - margin;
+  double high = crank_distance(leg, leg->angle_max, joint) - margin;
+  *room = least(*room, least(low, high));
+  return (position > leg->angle_min && low >= 0.0 ? 0u : STEWART_ANGLE_MIN) |
+         (position < leg->angle_max && high >= 0.0 ? 0u : STEWART_ANGLE_MAX);
+}
+
+/* On a path the sine grows by at most its length; on a straight way to its end there may be poses
+   out of reach. */
+static double crank_moved(double way, double path) {(void)way; return path;}
+
+/* A rod turns by at most 1 / (L2 k / L1) of the displacement of its joint. The sine is at most the
+   one before and the displacement, and where that passes the limit, the limit: stops whose levers
+   are not yet known to be within it end before. */
+static double crank_turn(
+  const stewart_leg * leg, double margin, double length, double lever, double moved) {
+  double steep = crank_steepness(leg), sine = crank_sine(crank_lever_ratio(leg, lever));
+  double most = crank_sine(leg->lever_min) + margin * steep, end = sine + moved * steep;
+  double turned_to = asin(least(end, most)) - asin(sine), beyond = largest(end - most, 0.0) / steep;
+  double turn = turned_to / (length * steep);
+  return beyond > 0.0 ? turn + beyond / (length * crank_sine(most)) : turn;
+}
+
+static int crank_levers_change(void) {return 1;}
+
+/* P'' <= |x'|^2 2 max(1, L2 / L1) / L2^2 + 2 (1 / L1 + 1 / L2) |x''|, and between two samples P is
+   above their chord less P'' time^2 / 8. */
+static double crank_pieces(
+  const stewart_leg * leg, double lever, double next_lever, const motion_bounds * most,
+  double arm, double time) {
+  double size = leg->crank_length, rod = leg->rod_length;
+  double a = lever * lever / (size * size), b = next_lever * next_lever / (size * size);
+  double velocity = most->velocity + arm * most->turning;
+  double acceleration = most->acceleration + arm * most->turning_rate;
+  double convex = 2.0 * largest(1.0, rod / size) / (rod * rod) * velocity * velocity +
+    2.0 * crank_steepness(leg) * acceleration;
+  double dip = 0.125 * time * time * convex, lowest_known = leg->lever_min * leg->lever_min;
+  double lowest_square = largest(least(a, b) - dip, 0.25 * lowest_known);
+  if (dip <= DIP * lowest_square && a < 2.0 * b && b < 2.0 * a) {return 1.0;}
+  return largest(ceil(sqrt(dip / (DIP * lowest_square))), ceil(fabs(log2(a / b))));
+}
+
+static unsigned crank_unproven(void) {return STEWART_LEVER_MIN;}
+
 #else  /* the library alone */
 
 static void crank_drive_row(

@@ -20,15 +20,16 @@
 #define CURVATURE 0.1      /* accelerations between two setpoints exceed both by this share */
 #define NEGLIGIBLE 1e-10   /* difference between setpoints [m, rad] */
 #define LARGEST 1e9        /* coordinate of a demand, or derivative of it, that is followed */
-/* Margins: of lengths a part of the stroke; of forces, torques and the condition number, which
-   change fastest between two samples, and of the other limits, parts of themselves. That of the
-   clearance, and of lengths without a stroke, is a part of the characteristic length. */
+/* Margins: of positions of drives a part of the stroke; of forces, torques and the condition
+   number, which change fastest between two samples, and of the other limits, parts of themselves.
+   That of the clearance, and of lengths without a stroke, is a part of the characteristic length.
+   */
 #define OF_STROKE 0.005
 #define OF_LOADS 0.03
 #define OF_OTHERS 0.02
 #define OF_SIZE 0.003
-/* A stop from velocity_max needs this part of the stroke, where its rate is between two bounds
-   [1/s]; the third is the rate without these limits. */
+/* A stop from the largest rate of the drives needs this part of the stroke, where its rate is
+   between two bounds [1/s]; the third is the rate without these limits. */
 #define STOP_IN 0.15
 #define SLOWEST_STOP 5.0
 #define FASTEST_STOP 50.0
@@ -51,6 +52,98 @@ typedef struct {
   stewart_motion motions[STOP_SAMPLES];
   stewart_result results[STOP_SAMPLES];  /* without condition numbers */
 } stop_samples;
+
+/* An interval between two samples of a stop has more of them, at most so many in all, where the
+   square of a lever may fall by a part of itself below both, or changes by a factor of 2. */
+#define DIP 0.02
+#define MOST_BETWEEN 64
+
+/* Limits of poses, each of which is checked at poses of its own. */
+enum { DRIVES, ANGLES, CLEARANCES, SINGULARITIES, KINDS };
+
+/* Lengths and levers of the lines of force [m], and by how much a limit of one kind is not
+   exceeded: displacement of the platform joint before that of a drive is, clearances [m], angles of
+   the joints [rad]; or the condition number, or more. */
+typedef struct { double lengths[6], levers[6], room[12], condition; } pose_room;
+
+/* Bounds of velocity and acceleration in an interval: of the head [m/s, m/s^2], and of a point by
+   its distance from the head [1/s, 1/s^2]. */
+typedef struct { double velocity, acceleration, turning, turning_rate; } motion_bounds;
+
+/* Of a kind of legs, for the governor:
+   margins: give the limits of the drive their margins; returns that of a displacement [m].
+   stop_rate: the largest rate of the drive by its stroke [1/s], nan where they are not limited.
+   put_room: write room of the drive in a pose, and return the limits that it exceeds.
+   moved: of a displacement of the platform joint and the length of its path, the one that counts.
+   turn: the most that the line of force turns while the joint moves so far; or infinite.
+   levers_change: whether the levers depend on the pose.
+   pieces: of an interval of a time between two samples with levers; arm: of the platform joint.
+   unproven: the limit that is named where the check of a stop does not end. */
+#ifndef STEWART_LIBRARY
+#define STEWART_LIBRARY
+#endif
+#define STEWART_GOVERNOR
+#include "telescopic.h"
+#include "crank.h"
+#undef STEWART_GOVERNOR
+
+static double put_drive_margins(
+  const stewart_platform * platform, stewart_leg * leg) {
+  double size = platform->characteristic_length;
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, margins, (size, leg))
+  }
+}
+
+static double leg_stop_rate(const stewart_platform * platform, int i) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, stop_rate, (&platform->legs[i]))
+  }
+}
+
+static unsigned put_drive_room(
+  const stewart_platform * platform, int i, double margin, const stewart_motion * motion,
+  pose_room * to) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, put_room, (
+      &platform->legs[i], margin, motion, to->lengths[i], &to->room[i]))
+  }
+}
+
+static double moved_of(const stewart_platform * platform, double way, double path) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, moved, (way, path))
+  }
+}
+
+static double turn_of(
+  const stewart_platform * platform, int i, double margin, const pose_room * from, double moved) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, turn, (
+      &platform->legs[i], margin, from->lengths[i], from->levers[i], moved))
+  }
+}
+
+static double pieces_of(
+  const stewart_platform * platform, int i, double lever, double next_lever,
+  const motion_bounds * most, double arm, double time) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, pieces, (
+      &platform->legs[i], lever, next_lever, most, arm, time))
+  }
+}
+
+static int levers_change(const stewart_platform * platform) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, levers_change, ())
+  }
+}
+
+static unsigned unproven_limit(const stewart_platform * platform) {
+  switch (platform->leg_kind) {
+    default: STEWART_LEG_KINDS(RETURN, unproven, ())
+  }
+}
 
 /* ---- the limits that are kept --------------------------------------------------------------- */
 
@@ -96,10 +189,7 @@ static void put_lowest_nearby(const stewart_platform * platform, stewart_platfor
 /* Give the limits of a leg their margins. */
 static void put_margins(
   const stewart_platform * platform, int i, stewart_leg * leg, governor_limits * limits) {
-  double low = leg->length_min, high = leg->length_max, size = platform->characteristic_length;
   int count = platform->n_torque_speed;
-  double stroke = low > 0.0 && isfinite(high) ? high - low : 0.0;
-  limits->length_margin[i] = stroke > 0.0 ? OF_STROKE * stroke : OF_SIZE * size;
   limits->base_angle_margin[i] =
     isinf(leg->base_joint_angle_max) ? 0.0 : OF_OTHERS * leg->base_joint_angle_max;
   limits->platform_angle_margin[i] =
@@ -110,16 +200,15 @@ static void put_margins(
   STEWART_LIMITS(BOUND, BOUND, MAGNITUDE)
 #undef BOUND
 #undef MAGNITUDE
-  leg->length_min += limits->length_margin[i], leg->length_max -= limits->length_margin[i];
   leg->base_joint_angle_max -= limits->base_angle_margin[i];
   leg->platform_joint_angle_max -= limits->platform_angle_margin[i];
   leg->torque_max *= 1.0 - OF_LOADS;
   /* There is no torque beyond the torque-speed curve. */
   leg->speed_max = (1.0 - OF_OTHERS) * least(
     leg->speed_max, count > 0 ? platform->torque_speed[count - 1][0] : HUGE_VAL);
+  limits->drive_margin[i] = put_drive_margins(platform, leg);
   /* Friction changes its sign where a leg reverses between two samples. */
   double change = 2.0 * leg->coulomb_friction;
-  leg->force_max -= change;
   limits->friction_torque[i] = platform->with_motors
     ? change / leg->motor_ratio * largest(1.0 / leg->efficiency, 1.0) : 0.0;
   leg->loss_velocity = HUGE_VAL;  /* breakaway torques at any rate, as if it could reverse */
@@ -129,11 +218,9 @@ static void put_margins(
 static double stop_rate_of(const stewart_platform * platform) {
   double rate = 0.0;
   for (int i = 0; i < 6; i++) {
-    const stewart_leg * leg = &platform->legs[i];
-    if (!(leg->length_min > 0.0 && isfinite(leg->length_max) && isfinite(leg->velocity_max))) {
-      return USUAL_STOP;
-    }
-    rate = largest(rate, leg->velocity_max / (leg->length_max - leg->length_min));
+    double of_leg = leg_stop_rate(platform, i);
+    if (isnan(of_leg)) {return USUAL_STOP;}
+    rate = largest(rate, of_leg);
   }
   return least(largest(2.0 * rate / STOP_IN, SLOWEST_STOP), FASTEST_STOP);
 }
@@ -294,13 +381,6 @@ static int lowest(unsigned bits) {
   return bits ? bit : 0;
 }
 
-/* Limits of poses, each of which is checked at poses of its own. */
-enum { LENGTHS, ANGLES, CLEARANCES, SINGULARITIES, KINDS };
-
-/* Lengths of the legs [m], and by how much a limit of one kind is not exceeded: lengths and
-   clearances [m], angles of the joints [rad]; or the condition number, or more. */
-typedef struct { double lengths[6], room[12], condition; } pose_room;
-
 /* Write a bound of the condition number of a result, larger by up to the number of legs, where that
    is enough; else the condition number. Returns det(J). */
 static double find_condition(
@@ -333,20 +413,20 @@ static int find_room(
   const stewart_leg * legs = on->platform->legs;
   unsigned exceeded = 0;
   for (int i = 0; i < 6; i++) {
-    to->lengths[i] =
-      known ? known->lengths[i] :
-      line_of(on->platform, i, motion->position, motion->rotation).length;
+    if (known) {
+      to->lengths[i] = known->lengths[i], to->levers[i] = known->levers[i];
+    } else {
+      leg_line at = line_of(on->platform, i, motion->position, motion->rotation);
+      to->lengths[i] = at.length, to->levers[i] = at.lever;
+    }
   }
   if (kind == SINGULARITIES) {
     double determinant = find_condition(on, motion, known, &to->condition);
     return to->condition < g->condition_max && determinant * g->side > 0.0 ? 0
       : GOVERNED_SINGULARITY + 1;
-  } else if (kind == LENGTHS) {
+  } else if (kind == DRIVES) {
     for (int i = 0; i < 6; i++) {
-      double length = to->lengths[i];
-      to->room[i] = least(length - legs[i].length_min, legs[i].length_max - length);
-      exceeded |= below(length, legs[i].length_min, STEWART_LENGTH_MIN) |
-        above(length, legs[i].length_max, STEWART_LENGTH_MAX);
+      exceeded |= put_drive_room(on->platform, i, g->drive_margin[i], motion, to);
     }
   } else if (kind == ANGLES) {
     double base_angles[6], angles[6];
@@ -370,37 +450,45 @@ static int find_room(
   return lowest(exceeded);
 }
 
-/* Largest displacement of the head, and largest turn, from one state of a stop until a time. */
-typedef struct { double way, turn; } displacement;
+/* Largest displacement of the head, length of its path, and largest turn, from one state of a stop
+   until a time. */
+typedef struct { double way, path, turn; } displacement;
 
 static displacement displace(const coordinates * from, double k, double time) {
   double kt = k * time, left = exp(-kt), gone = isinf(kt) ? 0.0 : kt * left;
   double of_rate = (1.0 - left) / k, of_change = (1.0 - left - gone) / (k * k), square = 0.0;
-  displacement to = {0.0, 0.0};
+  double rates = 0.0, changes = 0.0;
+  displacement to = {0.0, 0.0, 0.0};
   for (int i = 0; i < 6; i++) {
     double v = from->rate[i], b = from->acceleration[i] + k * v;
     double way = fabs(v) * of_rate + fabs(b) * of_change;
-    if (i < 3) {square += way * way;} else {to.turn += way;}
+    if (i < 3) {
+      square += way * way, rates += v * v, changes += b * b;
+    } else {
+      to.turn += way;
+    }
   }
-  to.way = sqrt(square);
+  to.way = sqrt(square), to.path = sqrt(rates) * of_rate + sqrt(changes) * of_change;
   return to;
 }
 
 /* Whether a displacement from a pose could exceed the limits of a kind by more than some of their
    margins.
 
-   A leg whose platform joint moves by d turns by less than asin(d / L), each of its points moves
-   by at most d, and distances between two of them change by no more than both move. Singular
-   values of J change by no more than its rows do (Weyl), and the largest is at least 1. */
+   Each point of a leg whose platform joint moves by d moves by at most d, and distances between two
+   of them change by no more than both move; its turn is that of its kind. Singular values of J
+   change by no more than its rows do (Weyl), and the largest is at least 1. */
 static int leaves(
   const governed * on, int kind, const pose_room * from, displacement by, double margins) {
   const governor_limits * g = on->limits;
   double farthest = by.way + by.turn * g->reach, square = 0.0;
   for (int i = 0; i < 6; i++) {
-    double d = by.way + by.turn * g->arms[i], sine = d / from->lengths[i], turn = 1.02 * sine;
-    if (!(sine <= 0.25)) {return 1;}  /* up to which that is more than the arc */
-    if (kind == LENGTHS) {
-      if (!(d <= from->room[i] + margins * g->length_margin[i])) {return 1;}
+    double round = by.turn * g->arms[i];
+    double d = moved_of(on->platform, by.way + round, by.path + round);
+    double turn = turn_of(on->platform, i, g->drive_margin[i], from, d);
+    if (!(turn < HUGE_VAL)) {return 1;}
+    if (kind == DRIVES) {
+      if (!(d <= from->room[i] + margins * g->drive_margin[i])) {return 1;}
     } else if (kind == ANGLES) {
       if (!(turn <= from->room[i] + margins * g->base_angle_margin[i]) ||
           !(turn + by.turn <= from->room[i + 6] + margins * g->platform_angle_margin[i])) {
@@ -426,7 +514,8 @@ static int leaves(
    poses that are surely within the limits. Both are within the margins, so that between them each
    pose is nearer than a margin to poses that one of them reaches. */
 static int check_poses(const governed * on, int kind, const stop_samples * stop) {
-  static const int limits[KINDS] = {0, 4, 6, GOVERNED_SINGULARITY};
+  const int limits[KINDS] = {
+    lowest(unproven_limit(on->platform)) - 1, 4, 6, GOVERNED_SINGULARITY};
   double k = on->limits->stop_rate, now = 0.0;  /* times its rate */
   int last = 0, between = 0;  /* sample before or at this time */
   for (int n = 0; n < STOP_POSES; n++) {
@@ -460,6 +549,9 @@ static int overloads(
   unsigned exceeded = 0;
   found.result = *result;
   complete_loads(on->platform, motion, 1, &found);
+  for (int i = 0; i < 6; i++) {  /* before what is not a number where a leg does not reach */
+    if (!(found.lever_ratios[i] >= 0.0)) {return lowest(STEWART_LEVER_MIN);}
+  }
   if (on->platform->with_motors && found.finite_motors == 0.0) {return GOVERNED_SINGULARITY + 1;}
   for (int i = 0; i < 6; i++) {
     double * torque = &found.motors.breakaway_torques[i];
@@ -467,6 +559,71 @@ static int overloads(
     exceeded |= check_leg(on->platform, &found, i);
   }
   return lowest(exceeded);
+}
+
+/* Bounds in a time after a state of a stop, whose velocity is (v + b t) exp(-k t). The angular
+   velocity is at most the sum of the rates of the angles, and its rate the sum of theirs and the
+   square of that. */
+static motion_bounds bounds_after(const coordinates * at, double k, double time) {
+  motion_bounds most = {0.0, 0.0, 0.0, 0.0};
+  for (int i = 0; i < 6; i++) {
+    double b = fabs(at->acceleration[i] + k * at->rate[i]);
+    double v = fabs(at->rate[i]) + b * time, a = b + k * v;
+    if (i < 3) {
+      most.velocity += v * v, most.acceleration += a * a;
+    } else {
+      most.turning += v, most.turning_rate += a;
+    }
+  }
+  most.velocity = sqrt(most.velocity), most.acceleration = sqrt(most.acceleration);
+  most.turning_rate += 2.0 * most.turning * most.turning;
+  return most;
+}
+
+/* Write times of a stop between its samples, where levers may change faster than rates do; returns
+   how many, or a number below 0 if they are too many. Its poses are within the limits. */
+static int put_times_between(const governed * on, const stop_samples * stop, double * times) {
+  double k = on->limits->stop_rate;
+  int count = 0;
+  /* In the last interval, which has no end, the platform hardly moves. */
+  for (int n = 0; n < STOP_SAMPLES - 2; n++) {
+    const double * levers = stop->results[in_order[n]].levers;
+    const double * next_levers = stop->results[in_order[n + 1]].levers;
+    double begin = stop_times[in_order[n]], time = stop_times[in_order[n + 1]] - begin;
+    double pieces = 1.0;
+    coordinates at = stopped(stop->from, k, begin / k);
+    motion_bounds most = bounds_after(&at, k, time / k);
+    for (int i = 0; i < 6; i++) {
+      pieces = largest(pieces, pieces_of(
+        on->platform, i, levers[i], next_levers[i], &most, on->limits->arms[i], time / k));
+    }
+    if (!(count + pieces <= MOST_BETWEEN + 1.0)) {return -1;}
+    for (int m = 1; m < (int)pieces; m++) {times[count++] = (begin + time * (m / pieces)) / k;}
+  }
+  return count;
+}
+
+/* The limit of rates and loads, counted from 1, that a stop exceeds between its samples, 0 if none.
+   */
+static int overloads_between(const governed * on, const stop_samples * stop) {
+  double times[MOST_BETWEEN];
+  stewart_motion motions[SAMPLES_AT_ONCE];
+  stewart_result results[SAMPLES_AT_ONCE];
+  int count = levers_change(on->platform) ? put_times_between(on, stop, times) : 0;
+  if (count < 0) {return lowest(unproven_limit(on->platform));}
+  for (int first = 0; first < count; first += SAMPLES_AT_ONCE) {
+    int some = count - first < SAMPLES_AT_ONCE ? count - first : SAMPLES_AT_ONCE;
+    for (int n = 0; n < some; n++) {
+      coordinates at = stopped(stop->from, on->limits->stop_rate, times[first + n]);
+      put_motion(on->limits, &at, &motions[n]);
+    }
+    solve_unloaded(on->platform, some, motions, results);
+    for (int n = 0; n < some; n++) {
+      int found = overloads(on, &motions[n], &results[n]);
+      if (found) {return found;}
+    }
+  }
+  return 0;
 }
 
 /* The limit, counted from 1, that a state or the stop from it exceeds, 0 if none. */
@@ -490,7 +647,7 @@ static int inadmissible(const governed * on, const coordinates * state) {
   for (int kind = 0; kind < KINDS && !found; kind++) {
     if (checked[kind]) {found = check_poses(on, kind, &stop);}
   }
-  return found;
+  return found ? found : overloads_between(on, &stop);
 }
 
 /* Each coordinate between stop and demand, by its share of the demand. */

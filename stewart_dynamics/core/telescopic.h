@@ -258,6 +258,52 @@ static int telescopic_check(const stewart_platform * platform, const stewart_leg
 
 #endif
 
+#elif defined STEWART_GOVERNOR
+
+static double telescopic_margins(double size, stewart_leg * leg) {
+  double low = leg->length_min, high = leg->length_max;
+  double stroke = low > 0.0 && isfinite(high) ? high - low : 0.0;
+  double margin = stroke > 0.0 ? OF_STROKE * stroke : OF_SIZE * size;
+  leg->length_min += margin, leg->length_max -= margin;
+  leg->force_max -= 2.0 * leg->coulomb_friction;  /* it may change its sign between two samples */
+  return margin;
+}
+
+static double telescopic_stop_rate(const stewart_leg * leg) {
+  if (!(leg->length_min > 0.0 && isfinite(leg->length_max) && isfinite(leg->velocity_max))) {
+    return NAN;
+  }
+  return leg->velocity_max / (leg->length_max - leg->length_min);
+}
+
+static unsigned telescopic_put_room(
+  const stewart_leg * leg, double margin, const stewart_motion * motion, double length,
+  double * room) {
+  (void)margin, (void)motion;
+  *room = least(length - leg->length_min, leg->length_max - length);
+  return below(length, leg->length_min, STEWART_LENGTH_MIN) |
+         above(length, leg->length_max, STEWART_LENGTH_MAX);
+}
+
+static double telescopic_moved(double way, double path) {(void)path; return way;}
+
+/* Less than asin(d / L), of which this is more up to a quarter. */
+static double telescopic_turn(
+  const stewart_leg * leg, double margin, double length, double lever, double moved) {
+  double sine = moved / length;
+  (void)leg, (void)margin, (void)lever;
+  return sine <= 0.25 ? 1.02 * sine : HUGE_VAL;
+}
+
+static int telescopic_levers_change(void) {return 0;}
+
+static double telescopic_pieces(
+  const stewart_leg * leg, double lever, double next_lever, const motion_bounds * most,
+  double arm, double time)
+{(void)leg, (void)lever, (void)next_lever, (void)most, (void)arm, (void)time; return 1.0;}
+
+static unsigned telescopic_unproven(void) {return STEWART_LENGTH_MIN;}
+
 #else  /* the library alone */
 
 static double telescopic_position(

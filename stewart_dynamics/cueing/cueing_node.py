@@ -49,7 +49,7 @@ _LATE = 'late: fell behind by {:.3f} s: that time is skipped'
 _JUMPED = '/clock jumped by {:.3f} s: the motion goes on from there'
 _REST = 1e-4  # velocity of a platform at rest [m/s, rad/s]
 _LONGEST_STOP = 5.0  # [s]
-_AWAY = 1e-3  # legs this near to their lengths at home need no approach [m]
+_AWAY = 1e-3  # drives this near to their positions at home need no approach [m, rad]
 
 
 class CueingNode(ManagedNode[CueingParameters]):
@@ -79,6 +79,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._approach: Array = np.empty((0, MOTION))
         self._presence = 0.0  # of the vehicle's motion, from 0 to 1
         self._held: dict[str, float] = {}
+        self._no_approach = ''  # the reason, where it does not start because of it
         self._ticks = 0
         self._due = 0  # index of the next setpoint, from the begin
         self._periods = DuePeriods(
@@ -136,10 +137,10 @@ class CueingNode(ManagedNode[CueingParameters]):
             samples = self._legs.read(data)
             if not samples:
                 return  # a part: the others follow
-            lengths = np.array(samples[-1][1]) + self._settings.geometry.zero_length
-            away = np.abs(lengths - platform.inverse_kinematics(self._cueing.governor.home))
+            positions = np.array(samples[-1][1]) + self._settings.geometry.zero_length
+            away = np.abs(positions - platform.inverse_kinematics(self._cueing.governor.home))
             pose = (self._cueing.governor.home if away.max() < _AWAY
-                    else platform.forward_kinematics(lengths))
+                    else platform.forward_kinematics(positions))
         except (MalformedError, JointStateError, StewartError) as exc:
             self._rejections.reject(MEASURED_LEGS, MALFORMED, str(exc))
             return
@@ -151,9 +152,11 @@ class CueingNode(ManagedNode[CueingParameters]):
         try:
             found = approach(StewartPlatform(p), pose, home, rate=p.cueing.rate)
         except StewartError as exc:
-            self._log.write([LogLine(ERROR, f'no approach to the home pose: {exc}', 'approach')])
+            # It does not start at home either: the platform is known to be elsewhere.
+            self._no_approach = f'no approach to the home pose: {exc}'
+            self._log.write([LogLine(ERROR, self._no_approach, 'approach')])
             return
-        self._approach = found.motion.rows
+        self._no_approach, self._approach = '', found.motion.rows
         self.get_logger().info(f'approach to the home pose: {found.times[-1]:.3g} s')
         self._go()
 
@@ -238,7 +241,8 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._vehicle.check(self._now / SECOND)
         if self._vehicle.mistake and self._vehicle.mistake != mistake:
             self._log.write([LogLine(WARN, f'vehicle: {self._vehicle.mistake}', 'mistake')])
-        if not self._periods.begun and now - self._activated > self._settings.start_timeout:
+        if not (self._periods.begun or self._no_approach) and (
+                now - self._activated > self._settings.start_timeout):
             if self._now:
                 self.get_logger().warning('no ~/measured_legs: starts at the home pose')
                 self._go()
@@ -260,7 +264,9 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._reported = self._due
         silent = self._vehicle.silent(self._now / SECOND)
         worst = max(held, key=held.__getitem__, default='')
-        if not self._periods.begun:
+        if self._no_approach:
+            level, message = ERROR, self._no_approach
+        elif not self._periods.begun:
             level, message = WARN, f'waits for {"~/measured_legs" if self._now else "/clock"}'
         elif self._due < len(self._approach):
             message = 'approaches the home pose'

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from stewart_dynamics.legs import require_kind
 from stewart_dynamics.parameters.parameter_set import declare
 from stewart_dynamics.parameters.table import COMBINED, PARAMETERS, Parameters, SEPARATE
 
@@ -34,8 +33,3 @@ class CueingParameters(Parameters):
 
     node = 'stewart_cueing'
     unused = frozenset(name for name in PARAMETERS if name.startswith(_NOT_USED))
-
-    def _check_together(self, source: str) -> None:
-        """Check the rules between parameters, and the kind of legs."""
-        super()._check_together(source)
-        require_kind(self, 'motion cueing')

@@ -36,7 +36,7 @@ from stewart_dynamics.core.binding import function, record
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion
-from stewart_dynamics.mechanics.governor import check_gaps, Governor, held_times
+from stewart_dynamics.mechanics.governor import check_gaps, Governor
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE, STANDARD_GRAVITY
 
@@ -296,4 +296,4 @@ class CueingStream:
     @property
     def held(self) -> dict[str, float]:
         """Return the time by which each limit has held the demand back [s], all axes together."""
-        return held_times(self._state['governor'])
+        return self.cueing.governor.held_times(self._state['governor'])

@@ -61,7 +61,6 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.cueing.recorded_vehicle import read_vehicle
     from stewart_dynamics.cueing.report_page import write_page
     from stewart_dynamics.cueing.vehicle import vehicle_mistake
-    from stewart_dynamics.legs import require_kind
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.reporting.results_folder import (
@@ -75,7 +74,6 @@ def _run(given: argparse.Namespace) -> int:
     before = check_free(given.output, options, CUEING)
     remove_abandoned([given.output])
     parameters = Parameters.from_yaml(given.params, given.node)
-    require_kind(parameters, 'motion cueing')
     vehicle = read_vehicle(given.vehicle, given.topic, Reading.given(given))
     _PROGRAM.prepare(likely_mistakes(parameters))
     mistake = vehicle_mistake(vehicle.times, vehicle.forces, vehicle.rates,

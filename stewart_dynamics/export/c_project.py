@@ -69,7 +69,7 @@ def _in_one(text: str) -> str:
     def part(found: re.Match[str]) -> str:
         of_kind = header(found[1])
         return of_kind[of_kind.index('#ifndef STEWART_LIBRARY\n'):].partition(
-            '\n#else')[0].partition('\n\n')[2]
+            '\n#el')[0].partition('\n\n')[2]
 
     return re.sub(r'#include "((?!stewart_dynamics)\w+\.h)"\n', part, text)
 

@@ -18,11 +18,13 @@ limits: one share of all six coordinates first, then each of them alone. A share
 with the stop that was checked before: there is always a next state. A share falls as it must, and
 grows in a quarter of a second; where the deviation has vanished, the motion is the demand itself.
 
-Lengths, angles, clearance and condition number are within their limits at each pose of a stop:
-from one pose that is checked to the next one, no point moves farther than the room of both (the
-conservative advancement of collision detection: B. Mirtich, Impulse-based Dynamic Simulation,
-Berkeley, 1996). Rates, forces and torques are checked at 16 samples of it; between these they
-exceed the bounds by less than the margins with which they are checked.
+Lengths, angles, levers, clearance and condition number are within their limits at each pose of a
+stop: from one pose that is checked to the next one, no point moves farther than the room of both
+(the conservative advancement of collision detection: B. Mirtich, Impulse-based Dynamic Simulation,
+Berkeley, 1996). Rates, forces and torques are checked at 16 samples of it, and at more of them
+where levers may change faster; between these they exceed the bounds by less than the margins with
+which they are checked. Bounds by the kind of legs, and why each state has a stop:
+docs/motion_cueing.md.
 
 A stream may demand anything. Where rates and accelerations are not those of its poses, they are
 taken from differences; where the hexapod cannot follow these, the demand has jumped, and the
@@ -42,30 +44,31 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import CODES, function, record
 from stewart_dynamics.errors import MotionError, ParameterError
-from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.frames.motion import check_kind, Motion, Pose
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.limits import (
-    LIMITS, OF_LEGS, SINGULARITY, SPEED_MAX, TORQUE_MAX, TORQUE_SPEED)
+    LIMITS, limits_of, SINGULARITY, SPEED_MAX, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import MOTION, POSE
 from stewart_dynamics.parameters.table import Parameters
 
-KEPT: Mapping[int, str] = {
-    **{LIMITS[name].bit.bit_length() - 1: name
-       for name in (*OF_LEGS, TORQUE_MAX, TORQUE_SPEED, SPEED_MAX)},
-    CODES['GOVERNED_SINGULARITY']: SINGULARITY}
-"""The limits that a governor keeps, by their places in ``governor_state.held``."""
-
 _LONGEST_GAP = 1000.0  # between two samples [s]: it takes half a second to compute
+
+
+def kept_limits(parameters: Parameters) -> Mapping[int, str]:
+    """Return the limits that a governor keeps, by their places in ``governor_state.held``."""
+    names = *limits_of(parameters).legs, TORQUE_MAX, TORQUE_SPEED, SPEED_MAX
+    return {**{LIMITS[name].bit.bit_length() - 1: name for name in names},
+            CODES['GOVERNED_SINGULARITY']: SINGULARITY}
 
 
 class Governor:
     """
     The limits of a hexapod as the functions in C take them.
 
+    kept: the limits that it keeps, see ``kept_limits``.
     arguments: their first ones: hexapod, limits.
     limits (): the structure ``governor_limits``.
     head (3,): point of the platform whose displacement is governed, platform frame [m].
@@ -74,8 +77,8 @@ class Governor:
     """
 
     def __init__(self, parameters: Parameters, head: Array) -> None:
-        require_kind(parameters, 'motion cueing')
         home = home_pose(parameters)
+        self.kept = kept_limits(parameters)
         within, limits = (np.zeros((), record(name)) for name in (
             'stewart_platform', 'governor_limits'))
         self._pose_limits = PoseLimits(parameters)
@@ -98,7 +101,12 @@ class Governor:
     def limit_of(self, state: Records) -> str | None:
         """Return a limit that a state (1,), or the stop from it, exceeds, with its margin."""
         limit = function('governed_limit')(*self.arguments, state)
-        return None if limit == 0 else KEPT[limit - 1]
+        return None if limit == 0 else self.kept[limit - 1]
+
+    def held_times(self, state: Records) -> dict[str, float]:
+        """Return the time by which each limit of a state has held the demand back [s]."""
+        held = state['held'].tolist()
+        return {limit: held[place] for place, limit in self.kept.items()}
 
     def check_home(self, parameters: Parameters) -> None:
         """Raise ParameterError where a limit is exceeded at home, at rest."""
@@ -167,15 +175,14 @@ class GovernedStream:
         return Motion.of_rows(rows)
 
     @property
+    def stop_rate(self) -> float:
+        """Return k of its stops, v'' + 2 k v' + k^2 v = 0 [1/s]."""
+        return float(self._governor.limits['stop_rate'])
+
+    @property
     def held(self) -> dict[str, float]:
         """Return the time by which each limit has held the demand back [s], all axes together."""
-        return held_times(self._stream['governor'])
-
-
-def held_times(state: Records) -> dict[str, float]:
-    """Return the time by which each limit has held the demand back [s], of a governor_state."""
-    held = state['held'].tolist()
-    return {limit: held[place] for place, limit in KEPT.items()}
+        return self._governor.held_times(self._stream['governor'])
 
 
 def check_gaps(times: Array, before: Array) -> None:

@@ -79,7 +79,11 @@ const char * name_of_limit(std::int64_t limit)
   if (limit == GOVERNED_SINGULARITY + 1) {
     return "singularity.stop_condition";
   }
-  switch (limit > 0 ? std::int64_t{1} << (limit - 1) : 0) {
+  const std::int64_t bit = limit > 0 ? std::int64_t{1} << (limit - 1) : 0;
+  if (bit == STEWART_CRANK_SPEED_MAX || bit == STEWART_CRANK_TORQUE_MAX) {  // drive.* has them, too
+    return bit == STEWART_CRANK_SPEED_MAX ? "limits.speed_max" : "limits.torque_max";
+  }
+  switch (bit) {
 #define SECTION_POSE "limits."
 #define SECTION_TWIST "limits."
 #define SECTION_LOAD "limits."

@@ -348,6 +348,24 @@ home_poses homes_of(const Params & p, stewart_platform hexapod)
   return home;
 }
 
+/// Check that there is a home pose; needed_by: what it is needed by, for the error without one.
+void check_home(const Params & p, const home_poses & home, const std::string & needed_by)
+{
+  if (has_cranks(p)) {
+    check(
+      home.reachable != 0.0 && home.known != 0.0, ("home pose: no level pose has all rods at the "
+      "cranks' middle angles: " + needed_by).c_str());
+    return;
+  }
+  check(
+    home.reachable != 0.0, ("home pose: no level pose has all legs between limits.length_min and "
+    "limits.length_max: " + needed_by).c_str());
+  check(
+    home.known != 0.0, ("home pose: limits.length_min and limits.length_max, or "
+    "geometry.zero_length, must give a length that the legs can have in a level pose: " +
+    needed_by).c_str());
+}
+
 /// Give cranks the branches that are set, or those that home decides.
 void put_branches(const Params & p, stewart_platform & hexapod)
 {
@@ -360,9 +378,7 @@ void put_branches(const Params & p, stewart_platform & hexapod)
     return;
   }
   const home_poses home = homes_of(p, hexapod);
-  check(
-    home.reachable != 0.0 && home.known != 0.0, "home pose: no level pose has all rods at the "
-    "cranks' middle angles: needed by geometry.crank_branch: auto");
+  check_home(p, home, "needed by geometry.crank_branch: auto");
   stewart_platform complete = hexapod;
   stewart_complete(&complete);
   const std::int64_t open = choose_branches(&complete, &home.poses[0], wanted, angles);
@@ -379,18 +395,6 @@ void put_branches(const Params & p, stewart_platform & hexapod)
     std::to_string((open + 5) % 6 + 1)).c_str());
 }
 
-/// Check that there is a home pose; needed_by: what it is needed by, for the error without one.
-void check_home(const home_poses & home, const std::string & needed_by)
-{
-  check(
-    home.reachable != 0.0, ("home pose: no level pose has all legs between limits.length_min and "
-    "limits.length_max: " + needed_by).c_str());
-  check(
-    home.known != 0.0, ("home pose: limits.length_min and limits.length_max, or "
-    "geometry.zero_length, must give a length that the legs can have in a level pose: " +
-    needed_by).c_str());
-}
-
 /// Give joints whose angles are limited, and screws that turn, the axes that they have without
 /// given ones, which follow from the home pose.
 void put_axes(const Params & p, stewart_platform & hexapod)
@@ -402,7 +406,7 @@ void put_axes(const Params & p, stewart_platform & hexapod)
       if (!given.empty() || !std::isfinite(hexapod.legs[0].*most)) {
         return;
       }
-      check_home(home, std::string("needed without geometry.") + name);
+      check_home(p, home, std::string("needed without geometry.") + name);
       for (std::size_t n = 0; n < 6; ++n) {
         std::copy_n((home.*directions)[n], 3, hexapod.legs[n].*axis);
       }
@@ -484,10 +488,9 @@ std::optional<Governor> governor_of(const Params & p, const stewart_platform & h
   if (!p.governor) {
     return std::nullopt;
   }
-  check(!has_cranks(p), "governor: available for telescopic legs alone");
   check(p.reference == "platform", "governor: needs reference: platform");
   const home_poses home = homes_of(p, hexapod);
-  check_home(home, "needed by governor");
+  check_home(p, home, "needed by governor");
   const double head[3] = {0.0, 0.0, 0.0};
   const coordinates at_home{};
   Governor governor;
