@@ -76,6 +76,11 @@ def _arguments() -> argparse.ArgumentParser:
                            'estimated)')
     add_reading(parser)
     calibrated = parser.add_argument_group('what is calibrated, and how')
+    calibrated.add_argument('--unknowns', type=names_of, default=('all',), metavar='GROUP,...',
+                            help='numbers that are calibrated, others keep the values of the '
+                                 'file: zero (of the drives; one pose is enough), joints, and of '
+                                 'cranks lengths and axes; several, as zero,lengths; all '
+                                 '(default)')
     calibrated.add_argument('--fixed', type=names_of, default=(), metavar='NAME,...',
                             help="parts that keep the file's values, as zero_length, "
                                  'base_joints.leg_1, platform_joints.leg_3.z')
@@ -97,7 +102,6 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.calibration.one_run import CalibrationOptions, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
     from stewart_dynamics.calibration.tracked_poses import read_tracked
-    from stewart_dynamics.legs import require_kind
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.tables.reading import is_table
@@ -105,11 +109,10 @@ def _run(given: argparse.Namespace) -> int:
     interrupt_on_signals()
     millimeters = Millimeters(given.mm or given.mm_positions, given.mm or given.mm_legs)
     options = CalibrationOptions(
-        given.fixed, given.frames, given.noise and Noise(*given.noise), given.hold_out,
+        given.fixed, given.unknowns, given.frames, given.noise and Noise(*given.noise), given.hold_out,
         millimeters, given.degrees, given.drive_positions, given.accept_mistakes, given.report,
         given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
-    require_kind(parameters, 'calibration')
     if given.design is not None:
         _PROGRAM.say(design_command.run(given, parameters, given.output or Path(DESIGNED)))
         return DONE
@@ -121,9 +124,10 @@ def _run(given: argparse.Namespace) -> int:
             Reading.given(given), millimeters)
     elif given.pose and is_table(Path(given.pose)):
         measured = read_tracked(
-            given.poses, Path(given.pose), parameters, millimeters, Reading.given(given))
+            given.poses, Path(given.pose), parameters, millimeters, Reading.given(given),
+            given.degrees)
     else:
-        measured = read_poses(given.poses, parameters.joints, millimeters, given.degrees,
+        measured = read_poses(given.poses, parameters, millimeters, given.degrees,
                               Reading.given(given))
     _PROGRAM.prepare(likely_mistakes(parameters))
     result = run(measured, str(given.poses), parameters, output, options)
