@@ -111,7 +111,8 @@ def main() -> None:
     least, most = (binom.ppf(each, options.seeds, 0.95) / options.seeds for each in (
         0.05 / bench.legs.count, 1.0 - 0.05 / bench.legs.count))
     lines += [f'Coverage of the 95 % intervals, {options.seeds} seeds; by chance alone, the '
-              f'fewest of {bench.legs.count} numbers are above {least:.1%} and the most below {most:.1%} '
+              f'fewest of {bench.legs.count} numbers are above {least:.1%} and the most below '
+              f'{most:.1%} '
               'in 95 % of such runs each. From 12 poses not all directions are identified; the '
               "intervals include that these keep the file's values:", '', *markdown(rows), '']
     rows = [('poses', 'by the file [um]', 'calibrated [um]', 'true geometry [um]', 'ratio')]

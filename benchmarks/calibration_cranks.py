@@ -26,7 +26,7 @@ from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT / 'test'))
 
-from measured_cranks import Built  # noqa: E402
+from measured_cranks import Built  # noqa: E402, I100, I202
 
 STAGES = ('zero',), ('zero', 'lengths'), ('zero', 'lengths', 'axes', 'joints')
 

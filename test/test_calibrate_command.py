@@ -165,7 +165,7 @@ def test_units_and_angles(table: Path, tmp_path: Path) -> None:
     # Lines can end in any way.
     path.write_bytes(path.read_bytes().replace(b'\r\n', b'\r'))
     np.testing.assert_array_equal(
-        read_poses(path, HEXAPOD.parameters, millimeters=Millimeters(True, True), degrees=True).positions,
+        read_poses(path, HEXAPOD.parameters, Millimeters(True, True), True).positions,
         found.positions)
 
 
@@ -195,7 +195,8 @@ def test_a_separator_in_the_header_of_an_ignored_column_separates_nothing(
     path = tmp_path / 'ignored.csv'
     path.write_text('\n'.join([f'{first},{ignored}', *(f'{row},0' for row in rows)]))
     np.testing.assert_array_equal(
-        read_poses(path, HEXAPOD.parameters).positions, read_poses(table, HEXAPOD.parameters).positions)
+        read_poses(path, HEXAPOD.parameters).positions,
+        read_poses(table, HEXAPOD.parameters).positions)
 
 
 @pytest.mark.parametrize('cell', [

@@ -183,8 +183,8 @@ def test_unknown_frames_of_an_exact_file_are_found_exactly() -> None:
     poses = random_poses(rng, 30)
     lengths, seen = measured(rng, values_of(LEGS), poses)
     seen = Equations(LEGS, lengths, seen).as_measured(seen, FRAMES)
-    for each, wanted in zip(find_frames(HEXAPOD.parameters, Equations(LEGS, lengths, seen)), FRAMES,
-                            strict=True):
+    for each, wanted in zip(find_frames(
+            HEXAPOD.parameters, Equations(LEGS, lengths, seen)), FRAMES, strict=True):
         assert_allclose(each.rows, wanted.rows, atol=1e-12)
 
 

@@ -16,9 +16,8 @@ import numpy as np
 import pytest
 from referees import ROOT
 from stewart_dynamics import (
-    approach, calibrate, Capability, check_planned_trajectory, MotionCueing, ParameterError,
+    approach, Capability, check_planned_trajectory, MotionCueing, ParameterError,
     Parameters, Pose, StewartPlatform)
-from stewart_dynamics.calibration.pose_design import design_poses
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.export.drive_files import drive_files
 from stewart_dynamics.export.linuxcnc import hal_lines
@@ -38,7 +37,6 @@ NOT_FOR_CRANKS = 'legs.crank.length: {}: available for telescopic legs alone'
 
 # Arguments of each program, and the feature that hexapods with cranks lack.
 PROGRAMS = {
-    'stewart_calibrate poses.csv': 'calibration', 'stewart_calibrate --design 20': 'calibration',
     'stewart_cueing_report vehicle.csv': 'motion cueing',
     'stewart_export --fmu --drives': '--drives', 'stewart_export --linuxcnc': '--linuxcnc',
     'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification',
@@ -92,9 +90,6 @@ CALLS: dict[str, Callable[[StewartPlatform], object]] = {
         platform.home_pose()),
     'planned trajectories': planned,
     'motion cueing': lambda platform: MotionCueing(platform.parameters),
-    'calibration': lambda platform: calibrate(
-        platform, np.zeros((20, 6)), Pose(np.zeros((20, 3)), [np.eye(3)] * 20)),
-    'calibration ': lambda platform: design_poses(platform, 20),
     'identification': lambda platform: Identification(
         platform.parameters, IdentificationOptions()),
     'identification ': lambda platform: design(platform.parameters, DesignOptions()),

@@ -39,7 +39,6 @@ class _Likeliest(NamedTuple):
     text: str
 
 
-
 def assembly_errors(legs: CalibratedLegs, values: Array, errors: Array, held: Flags,
                     ) -> tuple[LikelyMistake, ...]:
     """

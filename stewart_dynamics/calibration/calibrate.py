@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.calibration.assembly_errors import assembly_errors, TURN
 from stewart_dynamics.calibration.calibration_mistakes import (
     mistakes_of_input, mistakes_of_result, not_identified)
-from stewart_dynamics.calibration.assembly_errors import assembly_errors, TURN
 from stewart_dynamics.calibration.equations import (
-    chosen, DEVICE, Equations, Frames, GEOMETRY, GUIDED, held_by_groups, SAME, values_of, with_geometry)
+    chosen, DEVICE, Equations, Frames, GEOMETRY, GUIDED, held_by_groups, SAME, values_of,
+    with_geometry)
 from stewart_dynamics.calibration.frames import find_frames, pose_errors, PoseErrors
 from stewart_dynamics.calibration.geometry_fit import Fit, fit, minimum, Unknowns
 from stewart_dynamics.calibration.measured_poses import METERS, Millimeters
@@ -67,10 +68,9 @@ class Validation(NamedTuple):
 
 class Calibration(NamedTuple):
     """
-    A calibrated geometry of n numbers: base joints, platform joints, and those of the kind of legs.
+    A calibrated geometry of n numbers: base and platform joints, and those of the kind of legs.
 
-    Telescopic legs have 42 [m], with their zero lengths; cranks 66 [m] and [rad], with turns of the
-    zero and of the motor's axis from the file, and the lengths of cranks and rods.
+    Telescopic legs have 42, with their zero lengths; ``legs`` names them and their units.
     """
 
     parameters: Parameters
@@ -124,13 +124,13 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     platform : StewartPlatform
         The hexapod as it is drawn.
     lengths : (N, 6)
-        Measured positions of the drives, or commanded ones: as ``~/leg_states`` has them, positions
-        of legs [m] or angles of cranks [rad].
+        Measured positions of the drives, or commanded ones: as ``~/leg_states`` has them, [m], or
+        [rad] where the drives turn.
     poses : Pose of shape (N,)
         Measured poses.
     unknowns : sequence of str
-        Groups of numbers that are calibrated: ``zero``, ``joints``, of cranks ``lengths`` and
-        ``axes`` as well; ``all`` by default. One pose is enough for ``zero``.
+        Groups of numbers that are calibrated: ``zero``, ``joints``, of drives that turn
+        ``lengths`` and ``axes`` as well; ``all`` by default. One pose is enough for ``zero``.
     fixed : sequence of str
         Parts of the geometry that keep the file's values: ``zero_length``,
         ``base_joints.leg_1``, ``platform_joints.leg_3.z``.
@@ -145,7 +145,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     angles : (N, 3), optional
         The angles of which the poses were made, to find angles in another unit.
     degrees : bool
-        They, or the angles of cranks, were read as degrees.
+        They, or angles of drives, were read as degrees.
     millimeters : Millimeters
         The numbers that were read as mm, to name the option for those in another unit.
     drive_positions : bool
@@ -199,8 +199,8 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     if np.mean(sound) < 1.0 - MOST_OUTLIERS:
         refuse([LikelyMistake(
             'outliers', f'{np.sum(~sound)} of {len(sound)} poses do not fit the geometry that '
-            f'fits all others: {p.leg_kind.position.field} and poses must be of the same instants, '
-            'at rest')])
+            f'fits all others: {p.leg_kind.position.field} and poses must be of the same '
+            'instants, at rest')])
     exact = len(used.positions) * 6 == count  # no residual from which noise could be estimated
     known_noise = None if noise is None else Noise(*noise)
     found = fit(used, free, known_noise or (Noise(0.0, 0.0, 0.0) if exact else None))
@@ -277,8 +277,8 @@ def check_number(poses: int, legs: CalibratedLegs, held: Flags) -> None:
     """
     Raise StewartError if these are too few poses for the numbers that are not ``held`` (n,).
 
-    A pose has one equation of each leg, and one pose more gives the noise; one number of a leg, its
-    zero, can be taken from a single pose.
+    A pose has one equation of each leg, and one pose more gives the noise; one number of a leg,
+    its zero, can be taken from a single pose.
     """
     of_a_leg = max(int(np.count_nonzero(~held[legs.columns(leg)])) for leg in range(6))
     fewest = of_a_leg + 1 if of_a_leg > 1 else 1

@@ -162,7 +162,8 @@ def _name_of(equations: Equations) -> str:
 
 
 def _without_mistakes(parameters: Parameters, given: Equations, millimeters: Millimeters,
-                      degrees: bool, unknown_frames: bool) -> Iterator[tuple[LikelyMistake, Equations]]:
+                      degrees: bool, unknown_frames: bool,
+                      ) -> Iterator[tuple[LikelyMistake, Equations]]:
     """Yield mistakes, each with the measurements as they were without it."""
     lengths, pose, legs = given.positions, given.pose, given.legs
     unit, = legs.units.values()

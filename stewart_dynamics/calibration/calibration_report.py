@@ -26,7 +26,7 @@ from stewart_dynamics.whole_file import write_files
 
 _FOLDER = Path(__file__).with_name('templates')
 _MM = _MILLI = 1e3
-# Size of a picture of changes, its left margin, widths of charts by the numbers of a leg, gap [px].
+# Size of a picture of changes, left margin, widths of charts by the numbers of a leg, gap [px].
 _PICTURE, _LEFT, _WIDTHS, _GAP = (1160, 350), 60.0, {1: 200.0, 2: 300.0, 3: 410.0}, 28.0
 # Length of the longest arrow in a view, by the radius of the joints.
 _ARROW = 0.35
@@ -45,8 +45,9 @@ def write_report(path: Path, result: Mapping[str, Any], found: Calibration) -> N
         noise=noise_text(result['noise']), line=found.legs.line,
         outliers=[outlier_text(each) for each in result['outliers']],
         changes=_changes(found), views=[
-            _view(found, BASE, 'Base joints, from above', times),
-            _view(found, PLATFORM, 'Platform joints, from above', times)],
+            _view(found, part, f'{name} joints, from above', times)
+            for part, name in ((BASE, 'Base'), (PLATFORM, 'Platform'))
+            if any(state != FIXED for state in found.states[:PLATFORM.stop])],
         **page_values(result))
     write_files({path: text})
 

@@ -17,7 +17,7 @@ from stewart_dynamics.calibration.equations import inverse
 from stewart_dynamics.calibration.frames import PoseErrors
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.estimation.confidence_level import PERCENT, TWO_SIDED
-from stewart_dynamics.legs.calibrated import CalibratedLegs
+from stewart_dynamics.legs.calibrated import ALL_GROUPS, CalibratedLegs
 from stewart_dynamics.mechanics.frames.motion import listed, Pose
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
@@ -46,14 +46,16 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
             estimate(name, unit, start, value, state, error, share, False,
                      not lack and math.isfinite(error))
             for name, unit, start, value, state, error, share in zip(
-                found.names, units, found.start, found.values, found.states, found.errors, what.shares,
-                strict=True)],
+                found.names, units, found.start, found.values, found.states, found.errors,
+                what.shares, strict=True)],
         'combinations': combined(what, found.names, units, found.values, found.covariance),
         'rank': what.rank, 'unknowns': len(found.names) - found.states.count(FIXED),
         'singular_values': what.singular_values,
         'not_identified': found.not_identified,
-        'noise': {'given': found.noise_given,
-                  f'{drive.name}_{drive.unit}': found.noise.drive, 'position_m': found.noise.position, 'rotation_rad': found.noise.rotation},
+        'noise': None if not np.isfinite(found.errors).all() else {
+            'given': found.noise_given,
+            f'{drive.name}_{drive.unit}': found.noise.drive,
+            'position_m': found.noise.position, 'rotation_rad': found.noise.rotation},
         'frames': None if found.frames is None else {
             'device_in_base': _pose(found.frames.device),
             'target_in_platform': _pose(inverse(found.frames.target))},
@@ -101,8 +103,10 @@ def validation_text(held: Mapping[str, Any] | None) -> str:
             f'{after} by a fit to the others')
 
 
-def noise_text(noise: Mapping[str, Any]) -> str:
+def noise_text(noise: Mapping[str, Any] | None) -> str:
     """Return the noise of drives and poses in words."""
+    if noise is None:
+        return 'no intervals: as many residuals as unknowns give no noise; --noise does'
     drives = (f'leg positions {1e6 * noise["length_m"]:.2g} um' if 'length_m' in noise else
               f'angles {1e3 * noise["angle_rad"]:.2g} mrad')
     how = 'as given' if noise['given'] else 'estimated'
@@ -121,7 +125,7 @@ def frames_text(result: Mapping[str, Any]) -> str:
 
 def result_text(result: Mapping[str, Any]) -> str:
     """Return the content of calibration.json as text for the terminal."""
-    lack, noise = result['lack_of_fit'], result['noise']
+    lack = result['lack_of_fit']
     lines = textwrap.wrap(f'LACK OF FIT: {lack["text"]}', 100) if lack else []
     lines += [line for each in result['assembly'] for line in textwrap.wrap(each['text'], 100)]
     lines += [
@@ -129,13 +133,19 @@ def result_text(result: Mapping[str, Any]) -> str:
         validation_text(result['validation']),
         f'residuals of the legs, RMS: {1e6 * result["residuals"]["before_rms_m"]:.3g} um by the '
         f'file, {1e6 * result["residuals"]["after_rms_m"]:.3g} um calibrated',
-        noise_text(noise),
+        noise_text(result['noise']),
         *textwrap.wrap(frames_text(result), 100),
         *map(outlier_text, result['outliers']), '',
-        *table_lines(result['parameters'], 'calibrated')]
+        *table_lines(_asked(result), 'calibrated')]
     if result['not_identified']:
         lines += ['', *textwrap.wrap(result['not_identified'], 100)]
     return '\n'.join([*lines, *not_identifiable_lines(result, 'poses')])
+
+
+def _asked(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the parameters; of some groups of unknowns without all that was not asked for."""
+    return [each for each in result['parameters']
+            if each['state'] != FIXED or ALL_GROUPS in result['options']['unknowns']]
 
 
 def comments(result: Mapping[str, Any], legs: CalibratedLegs) -> dict[str, str]:

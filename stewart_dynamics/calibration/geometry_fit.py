@@ -16,7 +16,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.calibration.equations import (
-    BASE, DEVICE, Equations, FRAMES, GEOMETRY, Linearization, PLATFORM, TARGET)
+    BASE, DEVICE, Equations, FRAMES, Linearization, PLATFORM, TARGET)
 from stewart_dynamics.calibration.noise import (
     covariances, Noise, ROUNDING, VarianceComponents, whitening)
 from stewart_dynamics.legs.calibrated import CalibratedLegs

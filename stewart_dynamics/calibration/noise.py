@@ -23,7 +23,7 @@ from stewart_dynamics.calibration.equations import Linearization
 from stewart_dynamics.estimation.confidence_level import CONFIDENCE_LEVEL, TWO_SIDED
 from stewart_dynamics.mechanics.least_squares import normal
 
-# Lower bounds of standard deviations of the positions: by the estimated noise of the poses, without
+# Lower bounds of standard deviations of positions: by the estimated noise of the poses, without
 # which some combinations of positions could be exact; by the size of the hexapod, for exact data.
 _LEAST, ROUNDING = 0.05, 1e-13
 # Relative information, squared, of directions that are combinations of others.

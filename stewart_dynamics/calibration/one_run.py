@@ -57,7 +57,8 @@ def run(measured: MeasuredPoses, source: str, parameters: Parameters, folder: Pa
     remove_abandoned([folder])
     found = calibrate(
         StewartPlatform(parameters), measured.positions, measured.poses,
-        unknowns=options.unknowns, fixed=options.fixed, frames=options.frames, noise=options.noise, hold_out=options.hold_out,
+        unknowns=options.unknowns, fixed=options.fixed, frames=options.frames,
+        noise=options.noise, hold_out=options.hold_out,
         angles=measured.angles, degrees=options.degrees, millimeters=options.millimeters,
         drive_positions=options.drive_positions, accept_mistakes=options.accept_mistakes)
     result = document(found, measured, source, options.shown())

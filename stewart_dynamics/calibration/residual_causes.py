@@ -198,7 +198,8 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
         residuals = _Residuals.of(found, unknowns, legs)
         if residuals.freedom < 1:
             break
-        tried = sorted([*_causes(residuals, legs, equations.legs.of_a_leg, terms, sides, names, scatter), *(
+        tried = sorted([*_causes(
+            residuals, legs, equations.legs.of_a_leg, terms, sides, names, scatter), *(
             _Cause(residuals.of_terms(each[:, legs]), what, tuple(legs), (
                 f'{_ALIKE} ({-residuals.of_each(each[:, legs])[1][0]:+.2%})'))
             for what, each in scales.items())], reverse=True)

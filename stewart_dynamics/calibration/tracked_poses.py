@@ -62,8 +62,8 @@ def read_tracked(path: Path, tracked: Path, parameters: Parameters, millimeters:
         if extra not in (0, 1):
             raise StewartError(
                 f'{tracked}: the platform is at rest {len(rests)} times for {SHORTEST:g} s or '
-                f'more, {path} has {len(positions)} rows: they must be equal, or one rest more, at '
-                'home before the first pose')
+                f'more, {path} has {len(positions)} rows: they must be equal, or one rest more, '
+                'at home before the first pose')
         rows = np.array([mean_pose(rows[rest]) for rest in rests[extra:]])
         names = [f'{name}, t = {times[rest.start]:.1f} s'
                  for name, rest in zip(names, rests[extra:], strict=True)]

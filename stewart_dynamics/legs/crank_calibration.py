@@ -230,9 +230,9 @@ class CrankCalibration(CalibratedLegs):
             ratios = np.abs(found / p[name] - 1.0)
             if ratios.max() > _FARTHEST:
                 leg = int(np.argmax(ratios))
-                yield 'far', (f'{name} of {p.joints[leg]} would become {found[leg]:.4g} m in place '
-                              f'of {np.broadcast_to(p[name], 6)[leg]:.4g} m: the angles are not '
-                              'those of this hexapod')
+                before = np.broadcast_to(p[name], 6)[leg]
+                yield 'far', (f'{name} of {p.joints[leg]} would become {found[leg]:.4g} m in '
+                              f'place of {before:.4g} m: the angles are not those of this hexapod')
 
 
 def _near(angles: Array) -> Array:
