@@ -4,10 +4,11 @@
 """
 Errors of the assembly that calibrated zeros of drives show: a horn that sits on another tooth.
 
-A zero z is compared with each step s that an assembly can be off by, and with none, by the
-likelihood of what remains. That has the scale S of the zeros of the other legs, with the standard
-error of z: Student's distribution with few degrees of freedom, as S is estimated from five. The
-likelihood ratio is ``((1 + z^2 / (nu S^2)) / (1 + (z - s)^2 / (nu S^2)))^((nu + 1) / 2)``.
+A zero z is compared with each step s that an assembly can be off by, and with no step, by the
+likelihood of the remaining error. The error has Student's distribution with the scale S of the
+zeros of the other legs and the standard error of z, and with few degrees of freedom, as S is
+estimated from five zeros. The likelihood ratio is
+``((1 + z^2 / (nu S^2)) / (1 + (z - s)^2 / (nu S^2)))^((nu + 1) / 2)``.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from stewart_dynamics.legs.calibrated import CalibratedLegs, ZeroStep
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.reporting.estimates import LikelyMistake
 
-# A step is named if it is so much likelier than none; others beside it, if it is less likelier.
+# Logarithm of the likelihood ratio from which a step is named, and up to which others are named
+# beside it.
 NAMED = ALIKE = math.log(20.0)
 _FREEDOM = 3.0  # of the scale of the zeros: the median of five magnitudes
 _EXACT = 1e-9  # smallest scale [rad]

@@ -267,6 +267,8 @@ def _screws(p: Parameters, drive_positions: bool) -> Array:
             raise ParameterError('drive positions: with drive.screw_rotation: guided they are '
                                  'those of the legs')
         return screw_constants(p)
+    if not p.leg_kind.ratio:  # no screws
+        return GUIDED
     try:
         return np.column_stack([np.zeros(6), universal_axes(p)])
     except StewartError:  # no home pose

@@ -86,7 +86,7 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
 
 
 def _likelihood(equations: Equations, best: float, given: float) -> str:
-    """Return how much likelier positions without a mistake are, in words, where that is told."""
+    """Return how much likelier positions without a mistake are, in words; may be empty."""
     count = equations.positions.size - 12  # less the middle and the scatter of each leg
     if not equations.legs.signs or not 0.0 < best < given < math.inf or count < 1:
         return ''

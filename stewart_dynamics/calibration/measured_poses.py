@@ -100,7 +100,7 @@ def drive_columns(parameters: Parameters) -> Quantity:
 
 def drive_unit(parameters: Parameters, millimeters: Millimeters, degrees: bool) -> float:
     """
-    Return the unit of positions of drives whose headings have none, [m] or [rad].
+    Return the unit of positions of drives whose headings lack it, [m] or [rad].
 
     ParameterError if lengths of legs were asked for, where drives turn.
     """

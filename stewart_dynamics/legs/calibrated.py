@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What a calibration asks of a kind of legs: the numbers of a geometry, and the lines of its legs.
+Calibration as a kind of legs supports it: the numbers of a geometry, and the lines of its legs.
 
 A leg has a line of force from a point that its drive may move to its platform joint. The measured
 position of the drive says how long this line is, or where it begins; a measured pose says where it
@@ -93,7 +93,7 @@ class CalibratedLegs(ABC):
     force_words : str
         Static efforts of the drives, in words.
     line : str
-        What the lines are, in words.
+        Residual of a line, in words.
 
     """
 

@@ -4,7 +4,7 @@
 """
 Calibration of cranks: ``|B - A(q)| = L2`` with ``A = c + L1 e(q)``, q the measured angle.
 
-Of a leg 11 numbers: c, platform joint, L1, L2, and three small turns of the crank: about the axis
+A leg has 11 numbers: c, platform joint, L1, L2, and three small turns of the crank: about the axis
 of the motor (the zero of q), and of that axis about the crank at the angle 0 and across it. With
 the turn t of the axis as a rotation vector, and the zero z,
 ``e = exp(skew(t)) (z_0 cos(q + z) + n_0 sin(q + z))``.
@@ -144,7 +144,7 @@ class CrankCalibration(CalibratedLegs):
         """
         Return angles of the file, and these less measured ones: about their middles, and these.
 
-        Of the branch of each leg that leaves less scatter. Shapes (N, 6), (N, 6), (6,); nan where
+        Each leg has the branch that leaves less scatter. Shapes (N, 6), (N, 6), (6,); nan where
         a rod does not reach.
         """
         both = self.angles_at(vectors)
