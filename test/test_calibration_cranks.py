@@ -284,6 +284,8 @@ def test_too_few_poses_and_wrong_names_are_rejected(snapshot: Snapshot) -> None:
         calibrate(built.platform, angles, poses, unknowns=['teeth'])
     with snapshot.raises(ParameterError):
         calibrate(built.platform, angles, poses, fixed=['zero_length'])
+    with snapshot.raises(ParameterError):
+        calibrate(built.platform, angles, poses, drive_positions=True)
 
 
 @pytest.mark.parametrize('stage', [('zero',), ('zero', 'lengths'), ALL])
