@@ -18,6 +18,7 @@ import sys
 import numpy as np
 from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.calibration.assembly_errors import assembly_errors
 from stewart_dynamics.calibration.equations import (
     Equations, GEOMETRY, held_by_groups, values_of)
 from stewart_dynamics.calibration.geometry_fit import fit, Unknowns
@@ -64,6 +65,24 @@ def figures(parameters: Parameters, stage: tuple[str, ...], seeds: int, count: i
         f'{inside[:, ~held].mean():.1%}', f'{of_each.min():.1%}', f'{of_each.max():.1%} |'])
 
 
+def teeth(parameters: Parameters, spread: float, seeds: int) -> str:
+    """Return how often one tooth of 25 is named, by the deviation of the other zeros [deg]."""
+    legs = parameters.leg_kind.calibrated_legs(parameters)
+    held, errors = np.zeros(legs.count, dtype=bool), np.full(legs.count, np.radians(0.05))
+    named = right = alone = false = 0
+    for seed in range(seeds):
+        values = legs.values()
+        values[legs.zero] += np.radians(np.random.default_rng(seed).normal(0.0, spread, 6))
+        false += bool(assembly_errors(legs, values, errors, held))
+        values[legs.zero.start + 1] += np.radians(14.4)
+        texts = [each.text for each in assembly_errors(legs, values, errors, held)]
+        named += any('leg_2' in each for each in texts)
+        right += any('leg_2' in each and '14.4 deg of 25' in each for each in texts)
+        alone += any('leg_2' in each and '(14.4 deg of 25)' in each for each in texts)
+    return ' | '.join([f'| {spread:g} deg', *(
+        f'{each / seeds:.0%}' for each in (named, right, alone)), f'{false / seeds:.0%} |'])
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
@@ -77,6 +96,10 @@ def main() -> None:
     print('| --- ' * 12 + '|')
     for stage in STAGES:
         print(figures(parameters, stage, options.seeds, options.poses), flush=True)
+    print('\n| other zeros | named | with 25 teeth | with 25 teeth alone | named without one |')
+    print('| --- ' * 5 + '|')
+    for spread in (0.05, 0.2, 0.5, 1.0, 2.0, 3.0):
+        print(teeth(parameters, spread, 2 * options.seeds))
 
 
 if __name__ == '__main__':
