@@ -41,50 +41,50 @@ class Bench:
 
     def __init__(self, parameters: Parameters) -> None:
         self.platform = StewartPlatform(parameters)
-        self.start = values_of(parameters)
+        self.legs = parameters.leg_kind.calibrated_legs(parameters)
+        self.start = values_of(self.legs)
         self.home = self.platform.home_pose()
         self.unknowns = Unknowns.of(
-            self.start, parameters.singularity.characteristic_length,
-            np.zeros(GEOMETRY, dtype=bool), False)
+            self.legs, self.start, parameters.singularity.characteristic_length,
+            np.zeros(self.legs.count, dtype=bool), False)
 
     def measured(self, seed: int, count: int, noise: Noise = NOISE,
                  tilt: tuple[float, float, float] = ALL_TILTS) -> tuple[Array, Equations]:
         """Return true values, and measurements at random poses."""
         random = np.random.default_rng(seed)
         true = self.start.copy()
-        true[:GEOMETRY] += random.normal(0.0, 1e-3, GEOMETRY)
+        true[GEOMETRY] += random.normal(0.0, 1e-3, self.legs.count)
         poses = Pose(self.home.position + random.uniform(-_SIDE, _SIDE, (count, 3)),
                      from_euler(random.uniform(-1.0, 1.0, (count, 3)) * tilt))
-        lengths = Equations(np.zeros((count, 6)), poses).at(true).residuals
+        lengths = Equations(self.legs, np.zeros((count, 6)), poses).at(true).residuals
         turns = from_euler(random.normal(0.0, noise.rotation, (count, 3)))
         return true, Equations(
-            lengths + random.normal(0.0, noise.length, lengths.shape),
+            self.legs, lengths + random.normal(0.0, noise.drive, lengths.shape),
             Pose(poses.position + random.normal(0.0, noise.position, (count, 3)),
                  turns @ poses.rotation))
 
     def coverage(self, seeds: int, count: int, given: bool, noise: Noise) -> tuple[str, ...]:
         """Return the share of intervals with the true value: of all, and of single numbers."""
-        inside = np.zeros((seeds, GEOMETRY), dtype=bool)
+        inside = np.zeros((seeds, self.legs.count), dtype=bool)
         for seed in range(seeds):
             true, equations = self.measured(seed, count, noise)
             found = fit(equations, self.unknowns, noise if given else None)
             what = found.identifiability
             errors = np.sqrt(np.diag(found.covariance) + (what.shares * what.scales) ** 2)
-            inside[seed] = (np.abs(found.values - true) < TWO_SIDED * errors)[:GEOMETRY]
+            inside[seed] = (np.abs(found.values - true) < TWO_SIDED * errors)[GEOMETRY]
         of_each = inside.mean(axis=0)
-        return (f'{count}', f'{1e6 * noise.length:g} um, {1e6 * noise.position:g} um, '
+        return (f'{count}', f'{1e6 * noise.drive:g} um, {1e6 * noise.position:g} um, '
                 f'{1e6 * noise.rotation:g} urad', 'given' if given else 'estimated',
                 f'{inside.mean():.1%}', f'{of_each.min():.1%}', f'{of_each.max():.1%}')
 
     def held_out(self, count: int, seeds: int) -> tuple[str, ...]:
         """Return pose errors on 200 other poses: by file, calibrated, and by the true geometry."""
-        p = self.platform.parameters
         errors = np.zeros((seeds, 3))
         for seed in range(seeds):
             true, both = self.measured(seed, count + 200)
             values = fit(both.part(slice(0, count)), self.unknowns).values
             for n, each in enumerate((self.start, values, true)):
-                errors[seed, n] = pose_errors(with_geometry(p, each), both.part(
+                errors[seed, n] = pose_errors(with_geometry(self.legs, each), both.part(
                     slice(count, None)), both.frames).rms[0]
         file, mine, best = np.sqrt(np.mean(errors ** 2, axis=0))
         return (f'{count}', f'{1e6 * file:.0f}', f'{1e6 * mine:.1f}', f'{1e6 * best:.1f}',
@@ -109,9 +109,10 @@ def main() -> None:
         print(*rows[-1], sep=', ', file=sys.stderr, flush=True)
     # Smallest and largest of as many independent counts, each with 95 % of the runs.
     least, most = (binom.ppf(each, options.seeds, 0.95) / options.seeds for each in (
-        0.05 / GEOMETRY, 1.0 - 0.05 / GEOMETRY))
+        0.05 / bench.legs.count, 1.0 - 0.05 / bench.legs.count))
     lines += [f'Coverage of the 95 % intervals, {options.seeds} seeds; by chance alone, the '
-              f'fewest of {GEOMETRY} numbers are above {least:.1%} and the most below {most:.1%} '
+              f'fewest of {bench.legs.count} numbers are above {least:.1%} and the most below '
+              f'{most:.1%} '
               'in 95 % of such runs each. From 12 poses not all directions are identified; the '
               "intervals include that these keep the file's values:", '', *markdown(rows), '']
     rows = [('poses', 'by the file [um]', 'calibrated [um]', 'true geometry [um]', 'ratio')]
@@ -123,7 +124,7 @@ def main() -> None:
     rows = [('motion', 'identifiable for each leg', 'cannot be distinguished')]
     for name, tilt in KINDS.items():
         _, measured = bench.measured(1, 60, NOISE, tilt)
-        found = calibrate(bench.platform, measured.lengths, measured.pose)
+        found = calibrate(bench.platform, measured.positions, measured.pose)
         rows.append((name, f'{found.identifiability.rank / 6:g} of 7',
                      (found.not_identified or '').partition(': ')[2].partition(' cannot')[0]))
     lines += [*markdown(rows), '']
@@ -139,9 +140,9 @@ def main() -> None:
     lines += ['Mean half of the 95 % intervals that are predicted for designed and random poses '
               'within the limits:', '', *markdown(rows), '']
     _, measured = bench.measured(2, 1000)
-    calibrate(bench.platform, measured.lengths, measured.pose)  # imports and machine code
+    calibrate(bench.platform, measured.positions, measured.pose)  # imports and machine code
     begun, cpu = time.perf_counter(), time.process_time()
-    calibrate(bench.platform, measured.lengths, measured.pose)
+    calibrate(bench.platform, measured.positions, measured.pose)
     lines += [f'`calibrate` of 1,000 poses, with outliers, tests and validation: '
               f'{time.perf_counter() - begun:.2f} s, {time.process_time() - cpu:.2f} s of '
               'processor time.']

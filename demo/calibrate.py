@@ -73,12 +73,12 @@ def real_hexapod(drawing: Parameters, random: np.random.Generator) -> Parameters
 
 def measure(real: Parameters, poses: Path, random: np.random.Generator) -> str:
     """Return the poses that a tracker measures where the legs have the commanded positions."""
-    commanded = read_poses(poses, real.joints)
+    commanded = read_poses(poses, real)
     true = StewartPlatform(real).forward_kinematics(
-        commanded.lengths + real.geometry.zero_length, commanded.poses)
-    count = len(commanded.lengths)
+        commanded.positions + real.geometry.zero_length, commanded.poses)
+    count = len(commanded.positions)
     turns = from_euler(random.normal(0.0, NOISE, (count, 3)))
-    return poses_csv(real.joints, commanded.lengths, Pose(
+    return poses_csv(real.joints, commanded.positions, Pose(
         true.position + random.normal(0.0, NOISE, (count, 3)), turns @ true.rotation))
 
 

@@ -14,11 +14,12 @@ from stewart_dynamics import (
     calibrate, Motion, MotionError, ParameterError, Parameters, Pose, StewartError,
     StewartPlatform)
 from stewart_dynamics.calibration.equations import (
-    ALL, Equations, Frames, GEOMETRY, inverse, product, values_of, with_geometry)
+    Equations, Frames, GEOMETRY, inverse, product, values_of, with_geometry)
 from stewart_dynamics.calibration.frames import find_frames
 from stewart_dynamics.calibration.geometry_fit import fit, Unknowns
 from stewart_dynamics.calibration.measured_poses import Millimeters
 from stewart_dynamics.calibration.noise import covariances, Noise
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.drives.turning_screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 
@@ -47,6 +48,7 @@ REAL = np.array([
 
 EXACT = Noise(0.0, 0.0, 0.0)
 HEXAPOD = StewartPlatform.from_yaml(PLATFORM)
+LEGS = TELESCOPIC.calibrated_legs(HEXAPOD.parameters)
 FRAMES = Frames(Pose([1.0, 2.0, 0.3], from_euler([0.3, 0.2, 2.0])),
                 Pose([0.1, 0.2, 0.3], from_euler([0.5, -0.2, 1.0])))
 
@@ -65,30 +67,30 @@ def random_poses(rng: np.random.Generator, count: int, travel: float = 0.15,
 
 
 def true_values(rng: np.random.Generator, deviation: float = 1e-3) -> np.ndarray:
-    values = values_of(HEXAPOD.parameters)
-    values[:GEOMETRY] += rng.normal(0.0, deviation, GEOMETRY)
+    values = values_of(LEGS)
+    values[GEOMETRY] += rng.normal(0.0, deviation, LEGS.count)
     return values
 
 
 def measured(rng: np.random.Generator, values: np.ndarray, poses: Pose,
              noise: Noise = EXACT) -> tuple[np.ndarray, Pose]:
     """Return leg positions at true poses, and the poses with noise."""
-    lengths = Equations(np.zeros((len(poses), 6)), poses).at(values).residuals
+    lengths = Equations(LEGS, np.zeros((len(poses), 6)), poses).at(values).residuals
     turns = from_euler(rng.normal(0.0, noise.rotation, (len(poses), 3)))
-    return lengths + rng.normal(0.0, noise.length, lengths.shape), Pose(
+    return lengths + rng.normal(0.0, noise.drive, lengths.shape), Pose(
         poses.position + rng.normal(0.0, noise.position, (len(poses), 3)), turns @ poses.rotation)
 
 
 def test_residuals_are_those_of_inverse_kinematics() -> None:
     rng = np.random.default_rng(0)
     poses, values = random_poses(rng, 20), true_values(rng)
-    real = StewartPlatform(with_geometry(HEXAPOD.parameters, values))
+    real = StewartPlatform(with_geometry(LEGS, values))
     positions = real.inverse_kinematics(poses) - real.parameters['geometry.zero_length']
-    assert_allclose(Equations(positions, poses).at(values).residuals, 0.0, atol=1e-15)
+    assert_allclose(Equations(LEGS, positions, poses).at(values).residuals, 0.0, atol=1e-15)
     # The same poses, as a device in another frame measures another part of the platform.
-    seen = Equations(positions, poses, FRAMES).as_measured(poses, FRAMES)
+    seen = Equations(LEGS, positions, poses, FRAMES).as_measured(poses, FRAMES)
     values[42:] = [*FRAMES.device.position, 0, 0, 0, *FRAMES.target.position, 0, 0, 0]
-    there = Equations(positions, seen, FRAMES)
+    there = Equations(LEGS, positions, seen, FRAMES)
     assert_allclose(there.at(values).residuals, 0.0, atol=2e-15)
     assert_allclose(there.in_base(FRAMES).rows, poses.rows, atol=1e-14)
 
@@ -96,9 +98,9 @@ def test_residuals_are_those_of_inverse_kinematics() -> None:
 def test_derivatives_are_those_of_finite_differences() -> None:
     rng = np.random.default_rng(1)
     values = true_values(rng)
-    values[GEOMETRY:] = rng.normal(0.0, 0.3, 12)
-    equations = Equations(rng.normal(0.0, 1.0, (5, 6)), random_poses(rng, 5), FRAMES)
-    steps = 1e-6 * np.eye(ALL)
+    values[LEGS.count:] = rng.normal(0.0, 0.3, 12)
+    equations = Equations(LEGS, rng.normal(0.0, 1.0, (5, 6)), random_poses(rng, 5), FRAMES)
+    steps = 1e-6 * np.eye(len(values))
     differences = np.stack([
         (equations.at(values + step).residuals - equations.at(values - step).residuals) / 2e-6
         for step in steps], axis=-1)
@@ -123,7 +125,7 @@ def test_the_published_geometry_is_recovered(frames: str) -> None:
     """Without noise to 1e-9 mm, from the published nominal geometry."""
     p = Parameters.from_yaml(PLATFORM).replaced({
         'limits.length_min': None, 'limits.length_max': None})
-    nominal = StewartPlatform(with_geometry(p, published(NOMINAL)))
+    nominal = StewartPlatform(with_geometry(TELESCOPIC.calibrated_legs(p), published(NOMINAL)))
     true = published(REAL)
     rng = np.random.default_rng(2)
     poses = Pose(np.array([0.0, 0.0, 0.7]) + rng.uniform(-0.15, 0.15, (40, 3)),
@@ -133,7 +135,7 @@ def test_the_published_geometry_is_recovered(frames: str) -> None:
     if frames == 'known':
         found = calibrate(nominal, lengths, seen)
         assert set(found.states) == {'identified'}
-        assert np.abs(found.values - true[:GEOMETRY]).max() < 1e-12
+        assert np.abs(found.values - true[GEOMETRY]).max() < 1e-12
         assert found.validation is not None
         assert found.validation.before.rms[0] > 1e-3
         assert found.validation.after.largest[0] < 1e-12
@@ -146,10 +148,10 @@ def test_the_published_geometry_is_recovered(frames: str) -> None:
         for part in (0, 18):
             which = slice(part + 3 * leg, part + 3 * leg + 3)
             known[which] = true[which]
-    partly = StewartPlatform(with_geometry(p, known))
-    seen = Equations(lengths, seen).as_measured(seen, FRAMES)
+    partly = StewartPlatform(with_geometry(TELESCOPIC.calibrated_legs(p), known))
+    seen = Equations(LEGS, lengths, seen).as_measured(seen, FRAMES)
     found = calibrate(partly, lengths, seen, frames='unknown', fixed=fixed)
-    assert np.abs(found.values - true[:GEOMETRY]).max() < 1e-12
+    assert np.abs(found.values - true[GEOMETRY]).max() < 1e-12
     assert found.frames is not None
     for each, wanted in zip(found.frames, FRAMES, strict=True):
         assert_allclose(each.rows, wanted.rows, atol=1e-11)
@@ -159,8 +161,8 @@ def test_unknown_frames_are_defined_by_the_joints_of_the_file() -> None:
     rng = np.random.default_rng(3)
     values, poses = true_values(rng), random_poses(rng, 40)
     lengths, seen = measured(rng, values, poses)
-    seen = Equations(lengths, seen).as_measured(seen, FRAMES)
-    start = find_frames(HEXAPOD.parameters, Equations(lengths, seen))
+    seen = Equations(LEGS, lengths, seen).as_measured(seen, FRAMES)
+    start = find_frames(HEXAPOD.parameters, Equations(LEGS, lengths, seen))
     assert_allclose(start.device.position, FRAMES.device.position, atol=0.02)
     found = calibrate(HEXAPOD, lengths, seen, frames='unknown')
     assert set(found.states) == {'identified'}
@@ -179,10 +181,10 @@ def test_unknown_frames_are_defined_by_the_joints_of_the_file() -> None:
 def test_unknown_frames_of_an_exact_file_are_found_exactly() -> None:
     rng = np.random.default_rng(4)
     poses = random_poses(rng, 30)
-    lengths, seen = measured(rng, values_of(HEXAPOD.parameters), poses)
-    seen = Equations(lengths, seen).as_measured(seen, FRAMES)
-    for each, wanted in zip(find_frames(HEXAPOD.parameters, Equations(lengths, seen)), FRAMES,
-                            strict=True):
+    lengths, seen = measured(rng, values_of(LEGS), poses)
+    seen = Equations(LEGS, lengths, seen).as_measured(seen, FRAMES)
+    for each, wanted in zip(find_frames(
+            HEXAPOD.parameters, Equations(LEGS, lengths, seen)), FRAMES, strict=True):
         assert_allclose(each.rows, wanted.rows, atol=1e-12)
 
 
@@ -205,7 +207,7 @@ def test_the_kind_of_motion_gives_what_is_identifiable(
     assert found.validation.after.rms[0] < 1e-2 * found.validation.before.rms[0]
     # The identified numbers are right, the others keep the file's values along the unknown.
     of_state = np.array(found.states) == 'identified'
-    assert np.abs(found.values - values[:GEOMETRY])[of_state].max(initial=0.0) < (
+    assert np.abs(found.values - values[GEOMETRY])[of_state].max(initial=0.0) < (
         1e-12 if not noise.position else 1.5e-3)
 
 
@@ -214,16 +216,16 @@ def test_the_kind_of_motion_gives_what_is_identifiable(
 def test_intervals_hold_the_truth(count: int, noise: Noise) -> None:
     """Seeds enough for 95 % +- 3 %; benchmarks/calibration.py has 2,000."""
     unknowns = Unknowns.of(
-        values_of(HEXAPOD.parameters), 0.6, np.zeros(GEOMETRY, dtype=bool), False)
+        LEGS, values_of(LEGS), 0.6, np.zeros(LEGS.count, dtype=bool), False)
     inside, variances = [], []
     for seed in range(40):
         rng = np.random.default_rng(seed)
         values = true_values(rng)
         lengths, seen = measured(rng, values, random_poses(rng, count), noise)
-        found = fit(Equations(lengths, seen), unknowns)
+        found = fit(Equations(LEGS, lengths, seen), unknowns)
         errors = np.sqrt(np.diag(found.covariance) + (
-            found.identifiability.shares * unknowns.scales) ** 2)[:GEOMETRY]
-        inside.append(np.abs(found.values - values)[:GEOMETRY] < 1.96 * errors)
+            found.identifiability.shares * unknowns.scales) ** 2)[GEOMETRY]
+        inside.append(np.abs(found.values - values)[GEOMETRY] < 1.96 * errors)
         variances.append(np.square(found.noise))
     assert 0.92 < np.mean(inside) < 0.98
     assert_allclose(np.mean(variances, axis=0)[1:], np.square(noise)[1:], rtol=0.25)
@@ -234,9 +236,9 @@ def test_the_estimated_noise_has_the_largest_restricted_likelihood() -> None:
     rng = np.random.default_rng(12)
     lengths, seen = measured(rng, true_values(rng), random_poses(rng, 20),
                              Noise(1e-5, 1e-5, 1e-5))
-    found = fit(Equations(lengths, seen), Unknowns.of(
-        values_of(HEXAPOD.parameters), 0.6, np.zeros(GEOMETRY, dtype=bool), False))
-    x = found.lin.derivatives[..., :GEOMETRY].reshape(120, GEOMETRY)
+    found = fit(Equations(LEGS, lengths, seen), Unknowns.of(
+        LEGS, values_of(LEGS), 0.6, np.zeros(LEGS.count, dtype=bool), False))
+    x = found.lin.derivatives[..., GEOMETRY].reshape(120, LEGS.count)
     r = found.lin.residuals.ravel()
 
     def likelihood(noise: np.ndarray) -> float:
@@ -344,7 +346,7 @@ def test_likely_mistakes_are_named(what: str, words: str) -> None:
         position = rng.permutation(position)
     pose = Pose(position, rotation)
     if what == 'frames':
-        pose = Equations(lengths, pose).as_measured(pose, FRAMES)
+        pose = Equations(LEGS, lengths, pose).as_measured(pose, FRAMES)
     with pytest.raises(StewartError) as caught:
         calibrate(HEXAPOD, lengths, pose, angles=given, degrees=what.startswith('read'),
                   millimeters=Millimeters(*2 * [what.startswith('read')]))
@@ -428,7 +430,7 @@ def test_the_scale_of_the_device_is_not_blamed_on_the_legs(
         lengths, seen = measured(rng, true_values(rng), random_poses(rng, 40),
                                  Noise(2e-6, 1e-5, 1e-5))
         if frames == 'unknown':
-            seen = Equations(lengths, seen).as_measured(seen, FRAMES)
+            seen = Equations(LEGS, lengths, seen).as_measured(seen, FRAMES)
         if of_device:
             seen = Pose(scale * seen.position, seen.rotation)
         else:
@@ -515,7 +517,8 @@ UNIVERSAL = {'actuator.screw_lead': 0.01, 'drive.screw_rotation': 'universal',
 
 def turned_positions(rng: np.random.Generator, poses: Pose, values: np.ndarray) -> np.ndarray:
     """Return the positions of drives by the angles of their motors."""
-    real = StewartPlatform(with_geometry(HEXAPOD.parameters.replaced(UNIVERSAL), values))
+    real = StewartPlatform(with_geometry(
+        TELESCOPIC.calibrated_legs(HEXAPOD.parameters.replaced(UNIVERSAL)), values))
     angles = real.motors(Motion.from_pose(poses)).angles
     return angles * 0.01 / (2.0 * np.pi)
 
@@ -524,10 +527,10 @@ def test_derivatives_of_drive_positions_are_those_of_finite_differences() -> Non
     rng = np.random.default_rng(1)
     p = HEXAPOD.parameters.replaced(UNIVERSAL)
     values = true_values(rng)
-    values[GEOMETRY:] = rng.normal(0.0, 0.1, 12)
-    equations = Equations(rng.normal(0.0, 1.0, (5, 6)), random_poses(rng, 5), FRAMES,
+    values[LEGS.count:] = rng.normal(0.0, 0.1, 12)
+    equations = Equations(LEGS, rng.normal(0.0, 1.0, (5, 6)), random_poses(rng, 5), FRAMES,
                           screw_constants(p))
-    steps = 1e-6 * np.eye(ALL)
+    steps = 1e-6 * np.eye(len(values))
     lin = equations.at(values)
     assert_allclose(lin.derivatives, np.stack([
         (equations.at(values + step).residuals - equations.at(values - step).residuals) / 2e-6
@@ -550,11 +553,11 @@ def test_positions_of_drives_whose_screws_turn_with_their_legs(
     drives = turned_positions(rng, poses, values)
     assert np.abs(drives - lengths).max() > 1e-4
     if frames == 'unknown':
-        seen = Equations(lengths, seen).as_measured(seen, FRAMES)
+        seen = Equations(LEGS, lengths, seen).as_measured(seen, FRAMES)
     found = calibrate(platform, drives, seen, frames=frames, drive_positions=True)
     assert found.validation is not None
     if frames == 'known':
-        assert found.lack_of_fit == () and np.abs(found.values - values[:GEOMETRY]).max() < 1e-10
+        assert found.lack_of_fit == () and np.abs(found.values - values[GEOMETRY]).max() < 1e-10
         assert found.validation.after.largest[0] < 1e-9
     else:  # the base frame, with the axes in it, is that of the file's joints
         assert found.after.max() < 1e-7 and found.validation.after.largest[0] < 1e-6
@@ -592,7 +595,7 @@ def test_too_little_is_rejected(snapshot: Snapshot) -> None:
         with snapshot.raises(StewartError):
             calibrate(HEXAPOD, *measured(rng, true_values(rng), random_poses(rng, 40, tilt=tilt)),
                       frames='unknown')
-    assert calibrate(HEXAPOD, lengths, seen, noise=(0.0, 1e-5, 0.0)).noise.length == 0.0
+    assert calibrate(HEXAPOD, lengths, seen, noise=(0.0, 1e-5, 0.0)).noise.drive == 0.0
 
 
 def test_fixed_parts_keep_the_values_of_the_file() -> None:

@@ -34,7 +34,6 @@ NOT_FOR_CRANKS = 'legs.crank.length: {}: available for telescopic legs alone'
 LINUXCNC = '--linuxcnc: genhexkins has lengths of legs'
 # Arguments of each program, and the feature that hexapods with cranks lack.
 PROGRAMS = {
-    'stewart_calibrate poses.csv': 'calibration', 'stewart_calibrate --design 20': 'calibration',
     'stewart_cueing_report vehicle.csv': 'motion cueing',
     'stewart_export --fmu --linuxcnc': LINUXCNC, 'stewart_export --linuxcnc': LINUXCNC,
     'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification'}
@@ -73,9 +72,6 @@ CALLS: dict[str, Callable[[StewartPlatform], object]] = {
     'clearance between legs': lambda platform: Capability(platform).clearance(
         platform.home_pose()),
     'motion cueing': lambda platform: MotionCueing(platform.parameters),
-    'calibration': lambda platform: calibrate(
-        platform, np.zeros((20, 6)), Pose(np.zeros((20, 3)), [np.eye(3)] * 20)),
-    'calibration ': lambda platform: design_poses(platform, 20),
     'identification': lambda platform: Identification(
         platform.parameters, IdentificationOptions()),
     'identification ': lambda platform: design(platform.parameters, DesignOptions()),

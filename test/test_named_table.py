@@ -27,7 +27,8 @@ from stewart_dynamics.tables.reading import Reading
 
 PROGRAM = 'stewart_replay'
 PARAMS = ROOT / 'config' / 'platform.yaml'
-JOINTS = StewartPlatform.from_yaml(PARAMS).parameters.joints
+HEXAPOD = StewartPlatform.from_yaml(PARAMS).parameters
+JOINTS = HEXAPOD.joints
 
 
 def read(path: Path, text: str, **options: object) -> NamedTable:
@@ -145,7 +146,7 @@ def test_a_row_with_an_empty_cell_is_a_lost_sample(tmp_path: Path) -> None:
             for n in range(6)]
     names = ','.join((*JOINTS, *POSITION.columns, *QUATERNION.columns))
     path.write_text('\n'.join([names, *rows]))
-    poses = read_poses(path, JOINTS)
+    poses = read_poses(path, HEXAPOD)
     assert poses.names == ('row 2', 'row 3', 'row 4', 'row 6', 'row 7')
 
 

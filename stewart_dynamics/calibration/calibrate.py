@@ -18,18 +18,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.calibration.assembly_errors import assembly_errors, TURN
 from stewart_dynamics.calibration.calibration_mistakes import (
     mistakes_of_input, mistakes_of_result, not_identified)
 from stewart_dynamics.calibration.equations import (
-    chosen, Equations, Frames, GEOMETRY, GUIDED, names_of, SAME, values_of, with_geometry)
+    chosen, DEVICE, Equations, Frames, GEOMETRY, GUIDED, held_by_groups, SAME, values_of,
+    with_geometry)
 from stewart_dynamics.calibration.frames import find_frames, pose_errors, PoseErrors
 from stewart_dynamics.calibration.geometry_fit import Fit, fit, minimum, Unknowns
-from stewart_dynamics.calibration.measured_poses import FEWEST, METERS, Millimeters
+from stewart_dynamics.calibration.measured_poses import METERS, Millimeters
 from stewart_dynamics.calibration.noise import Noise
 from stewart_dynamics.calibration.outliers import MOST_OUTLIERS, outliers
 from stewart_dynamics.calibration.residual_causes import lack_of_fit
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
-from stewart_dynamics.legs import require_kind
+from stewart_dynamics.legs.calibrated import ALL_GROUPS, CalibratedLegs
 from stewart_dynamics.mechanics.arguments import as_array, wrong_type
 from stewart_dynamics.mechanics.drives.turning_screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
@@ -65,19 +67,23 @@ class Validation(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """A calibrated geometry: 42 numbers, base joints, platform joints, zero lengths."""
+    """
+    A calibrated geometry of n numbers: base and platform joints, and those of the kind of legs.
+
+    Telescopic legs have 42, with their zero lengths; ``legs`` names them and their units.
+    """
 
     parameters: Parameters
     """The file's parameters with the calibrated geometry."""
     names: tuple[str, ...]
     start: Array
-    """(42,) values of the file [m]."""
+    """(n,) values of the file."""
     values: Array
-    """(42,) calibrated [m]."""
+    """(n,) calibrated."""
     covariance: Array
-    """(42, 42) [m^2]"""
+    """(n, n)"""
     errors: Array
-    """(42,) standard errors, with what the poses cannot identify [m]."""
+    """(n,) standard errors, with what the poses cannot identify; infinite if no noise is known."""
     states: tuple[str, ...]
     identifiability: Identifiability
     not_identified: str | None
@@ -96,10 +102,15 @@ class Calibration(NamedTuple):
     lack_of_fit: tuple[LikelyMistake, ...]
     likely: tuple[LikelyMistake, ...]
     """Mistakes that were accepted."""
+    assembly: tuple[LikelyMistake, ...]
+    """Errors of the assembly that calibrated zeros show, which are in the values."""
+    legs: CalibratedLegs
+    """The numbers by name, unit and group."""
 
 
 def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion, *,
-              fixed: Sequence[str] = (), frames: str = 'known',
+              unknowns: Sequence[str] = (ALL_GROUPS,), fixed: Sequence[str] = (),
+              frames: str = 'known',
               noise: tuple[float, float, float] | None = None,
               hold_out: float = HOLD_OUT,
               angles: Array | None = None, degrees: bool = False,
@@ -113,9 +124,13 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     platform : StewartPlatform
         The hexapod as it is drawn.
     lengths : (N, 6)
-        Measured leg positions, or commanded ones: as ``~/leg_states`` has them [m].
+        Measured positions of the drives, or commanded ones: as ``~/leg_states`` has them, [m], or
+        [rad] where the drives turn.
     poses : Pose of shape (N,)
         Measured poses.
+    unknowns : sequence of str
+        Groups of numbers that are calibrated: ``zero``, ``joints``, of drives that turn
+        ``lengths`` and ``axes`` as well; ``all`` by default. One pose is enough for ``zero``.
     fixed : sequence of str
         Parts of the geometry that keep the file's values: ``zero_length``,
         ``base_joints.leg_1``, ``platform_joints.leg_3.z``.
@@ -123,14 +138,14 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         Whether the poses are those of the platform frame in the base frame, or of a target on the
         platform in the frame of a device.
     noise : three floats, optional
-        Standard deviations of lengths [m], of each coordinate of the positions [m], and of the
-        rotations about each axis [rad]; estimated by default.
+        Standard deviations of the positions of drives, of each coordinate of the positions [m],
+        and of the rotations about each axis [rad]; estimated by default.
     hold_out : float
         Share of the poses that validates a fit to the others; 0: none.
     angles : (N, 3), optional
         The angles of which the poses were made, to find angles in another unit.
     degrees : bool
-        They were read as degrees.
+        They, or angles of drives, were read as degrees.
     millimeters : Millimeters
         The numbers that were read as mm, to name the option for those in another unit.
     drive_positions : bool
@@ -146,16 +161,16 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
 
     """
     p = platform.parameters
-    require_kind(p, 'calibration')
-    measured = _checked(platform, lengths, poses)._replace(screws=_screws(p, drive_positions))
+    legs = p.leg_kind.calibrated_legs(p)
+    held = held_by_groups(legs, unknowns)
+    measured = _checked(legs, held, lengths, poses)._replace(screws=_screws(p, drive_positions))
     if frames not in ('known', 'unknown'):
         raise ParameterError(f"frames: {frames!r}: must be 'known' or 'unknown'")
     if noise is not None and not any(noise):
         raise ParameterError('noise: 0, 0, 0: one of them must be above 0')
     unknown = frames == 'unknown'
-    held: Flags = np.zeros(GEOMETRY, dtype=bool)
     for name in fixed:
-        held[chosen(p, name)] = True
+        held[chosen(legs, name)] = True
     if held.all() and not unknown:
         raise ParameterError('fixed: nothing is left to be calibrated')
     likely: list[LikelyMistake] = []
@@ -170,33 +185,43 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     known = find_frames(p, measured) if unknown else SAME
     measured = measured._replace(frames=known)
     size = p.singularity.characteristic_length
-    unknowns = Unknowns.of(values_of(p, known), size, held, unknown)
-    first = outliers(measured, unknowns)
+    of_file, start = values_of(legs, known), values_of(legs, known)
+    if not held[legs.zero].any():
+        start[legs.zero] = legs.zero_guesses(measured.vectors(of_file), measured.positions)
+    free = Unknowns.of(legs, start, size, held, unknown)
+    first = outliers(measured, free)
     sound: Flags = ~first.left_out
     used = measured.part(sound)
-    if len(used.lengths) * 6 <= unknowns.basis.shape[1]:
-        raise StewartError(f'{len(used.lengths)} poses for {unknowns.basis.shape[1]} unknowns: '
-                           f'at least {unknowns.basis.shape[1] // 6 + 1} are needed')
+    count = free.basis.shape[1]
+    if len(used.positions) * 6 < count or (unknown and len(used.positions) * 6 == count):
+        raise StewartError(f'{len(used.positions)} poses for {count} unknowns: '
+                           f'at least {count // 6 + 1} are needed')
     if np.mean(sound) < 1.0 - MOST_OUTLIERS:
         refuse([LikelyMistake(
             'outliers', f'{np.sum(~sound)} of {len(sound)} poses do not fit the geometry that '
-            'fits all others: lengths and poses must be of the same instants, at rest')])
-    found = fit(used, unknowns, None if noise is None else Noise(*noise))
-    lack = lack_of_fit(platform, used, found, unknowns, held, found.whitened if noise else None)
+            f'fits all others: {p.leg_kind.position.field} and poses must be of the same '
+            'instants, at rest')])
+    exact = len(used.positions) * 6 == count  # no residual from which noise could be estimated
+    known_noise = None if noise is None else Noise(*noise)
+    found = fit(used, free, known_noise or (Noise(0.0, 0.0, 0.0) if exact else None))
+    lack = lack_of_fit(platform, used, found, free, held, found.whitened if noise else None)
     what = found.identifiability
-    what = what._replace(scales=what.scales[:GEOMETRY], shares=what.shares[:GEOMETRY],
-                         directions=what.directions[:GEOMETRY])
+    what = what._replace(scales=what.scales[GEOMETRY], shares=what.shares[GEOMETRY],
+                         directions=what.directions[GEOMETRY])
     states = tuple(FIXED if each else state for each, state in zip(
         held, states_of(what), strict=True))
-    refuse(mistakes_of_result(p, found.values, found.lin.residuals, size))
-    missing = not_identified(p.joints, what.shares, LARGEST_SHARE, used, size)
+    refuse(mistakes_of_result(legs, found.values, found.lin.residuals, size))
+    assembly = assembly_errors(legs, found.values[GEOMETRY], np.sqrt(
+        np.maximum(np.diag(found.covariance)[GEOMETRY], 0.0)), held)
+    refuse(each for each in assembly if each.what == TURN)
+    missing = not_identified(used, what.shares, LARGEST_SHARE, size)
     before, after = (np.sqrt(np.mean(each ** 2, axis=0)) for each in (
-        used.at(_with_frames(used, unknowns)).residuals, found.lin.residuals))
+        used.at(_with_frames(used, free, of_file)).residuals, found.lin.residuals))
     if IDENTIFIED not in states:
         refuse([LikelyMistake(
             'identifiable', 'no number is identifiable by itself, with residuals of '
             f'{1e3 * after.max():.3g} mm: {lack[0].text if lack else missing}')])
-    validation = _validated(p, used, unknowns, found, hold_out)
+    validation = _validated(used, free, of_file, found, hold_out)
     if validation is not None:
         errors_before, errors_after = (
             math.hypot(each.rms[0], size * each.rms[1]) for each in validation)
@@ -205,30 +230,34 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
                 'worse', f'held-out poses are {_shown(validation.before)} off by the file, but '
                 f'{_shown(validation.after)} by a fit to the others: the poses do not support a '
                 'better geometry' + (f'; {lack[0].text}' if lack else ''))])
-    covariance = found.covariance[:GEOMETRY, :GEOMETRY]
+    covariance = found.covariance[GEOMETRY, GEOMETRY]
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) + (what.shares * what.scales) ** 2)
+    if exact and noise is None:
+        errors[~held] = np.inf
     # Errors of neighbors are correlated: poses are known better than each number of the geometry.
-    rounded = justified(found.values[:GEOMETRY],
+    rounded = justified(found.values[GEOMETRY],
                         np.maximum(_DIGITS * np.sqrt(np.diag(covariance)), _FINEST))
     return Calibration(
-        with_geometry(p, rounded), names_of(p), unknowns.start[:GEOMETRY],
-        found.values[:GEOMETRY], covariance, errors, states, what, missing, found.noise,
+        with_geometry(legs, rounded, held, written=True), legs.names(), of_file[GEOMETRY],
+        found.values[GEOMETRY], covariance, errors, states, what, missing, found.noise,
         noise is not None, used.frames_at(found.values) if unknown else None,
-        len(used.lengths), before, after,
+        len(used.positions), before, after,
         tuple(Outlier(int(n), tuple(map(int, np.flatnonzero(first.outlying[n]))),
                       float(np.abs(first.residuals[n]).max())) for n in np.flatnonzero(~sound)),
-        validation, lack, tuple(likely))
+        validation, lack, tuple(likely), assembly, legs)
 
 
-def _checked(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motion) -> Equations:
+def _checked(legs: CalibratedLegs, held: Flags, lengths: ArrayLike, poses: Pose | Motion,
+             ) -> Equations:
     if not isinstance(poses, (Pose, Motion)):
         raise wrong_type('poses', poses, 'a Pose')
-    given = as_array('lengths', lengths, (6,))
+    field = legs.parameters.leg_kind.position.field
+    given = as_array(field, lengths, (6,))
     pose = poses.pose if isinstance(poses, Motion) else poses
     if given.ndim != 2 or pose.shape != given.shape[:1]:
-        raise MotionError(f'lengths {given.shape}, poses {pose.shape}: must be (N, 6) and (N,)')
-    check_number(len(given))
-    return Equations(given, pose)
+        raise MotionError(f'{field} {given.shape}, poses {pose.shape}: must be (N, 6) and (N,)')
+    check_number(len(given), legs, held)
+    return Equations(legs, given, pose)
 
 
 def _screws(p: Parameters, drive_positions: bool) -> Array:
@@ -238,39 +267,48 @@ def _screws(p: Parameters, drive_positions: bool) -> Array:
             raise ParameterError('drive positions: with drive.screw_rotation: guided they are '
                                  'those of the legs')
         return screw_constants(p)
+    if not p.leg_kind.ratio:  # no screws
+        return GUIDED
     try:
         return np.column_stack([np.zeros(6), universal_axes(p)])
     except StewartError:  # no home pose
         return GUIDED
 
 
-def check_number(poses: int) -> None:
-    """Raise StewartError if these are too few poses."""
-    if poses < FEWEST:
-        raise StewartError(f'{poses} poses: at least {FEWEST} are needed, each leg has 7 '
-                           'unknowns; 40 are advisable')
+def check_number(poses: int, legs: CalibratedLegs, held: Flags) -> None:
+    """
+    Raise StewartError if these are too few poses for the numbers that are not ``held`` (n,).
+
+    A pose has one equation of each leg, and one pose more gives the noise; one number of a leg,
+    its zero, can be taken from a single pose.
+    """
+    of_a_leg = max(int(np.count_nonzero(~held[legs.columns(leg)])) for leg in range(6))
+    fewest = of_a_leg + 1 if of_a_leg > 1 else 1
+    if poses < fewest:
+        raise StewartError(f'{poses} poses: at least {fewest} are needed, each leg has {of_a_leg} '
+                           f'unknown{"s" if of_a_leg > 1 else ""}; 40 are advisable')
 
 
-def _with_frames(equations: Equations, unknowns: Unknowns) -> Array:
+def _with_frames(equations: Equations, unknowns: Unknowns, of_file: Array) -> Array:
     """Return the file's values, with the frames that fit them best if these are unknown."""
-    if not unknowns.basis[GEOMETRY:].any():
-        return unknowns.start
-    return minimum(equations, unknowns.start, np.diag(unknowns.scales)[:, GEOMETRY:], np.eye(6))
+    if not unknowns.basis[DEVICE.start:].any():
+        return of_file
+    return minimum(equations, of_file, np.diag(unknowns.scales)[:, DEVICE.start:], np.eye(6))
 
 
-def _validated(parameters: Parameters, equations: Equations, unknowns: Unknowns, found: Fit,
+def _validated(equations: Equations, unknowns: Unknowns, of_file: Array, found: Fit,
                hold_out: float) -> Validation | None:
     """Return the validation: every n-th pose is predicted by a fit to the others."""
     every = round(1.0 / hold_out) if hold_out > 0.0 else 0
-    index = np.arange(len(equations.lengths))
+    index = np.arange(len(equations.positions))
     held = index % every == every // 2 if every else index < 0
     if not held.any() or np.count_nonzero(~held) < _FEWEST_OTHERS:
         return None
     others = equations.part(~held)
-    before = _with_frames(others, unknowns)
+    before = _with_frames(others, unknowns, of_file)
     after = fit(others, unknowns, found.noise).values
     return Validation(*(pose_errors(
-        with_geometry(parameters, each), equations.part(held).of_legs(each),
+        with_geometry(equations.legs, each), equations.part(held).of_legs(each),
         equations.frames_at(each))
         for each in (before, after)))
 

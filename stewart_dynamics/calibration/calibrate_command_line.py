@@ -35,15 +35,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _arguments() -> argparse.ArgumentParser:
     parser = _PROGRAM.parser(
-        description="Calibrate a hexapod's geometry, base joints, platform joints and zero "
-                    'lengths, from leg positions and poses that a tracker, camera or probe '
+        description="Calibrate a hexapod's geometry, joints, zeros of the drives and lengths, "
+                    'from positions of the drives and poses that a tracker, camera or probe '
                     'measured.',
         files='DIR/ gets calibrated.yaml (the whole parameter file, for the node), '
               'calibration.json and report.html.')
     parser.add_argument('poses', nargs='?', type=Path, metavar='POSES',
-                        help='CSV file with a column for each leg (its position, as '
-                             '~/leg_states has it), x, y, z [m] and qx, qy, qz, qw, or alpha, '
-                             'beta, gamma [rad]; or a bag with measured legs and poses')
+                        help='CSV file with a column for each leg (the position of its '
+                             'drive, as ~/leg_states has it), x, y, z [m] and qx, qy, qz, qw, '
+                             'or alpha, beta, gamma [rad]; or a bag with measured legs and poses')
     add_parameters(parser, ', as it is drawn')
     _PROGRAM.add_results(parser, CALIBRATED)
     parser.set_defaults(output=None)  # --design has another one
@@ -61,7 +61,9 @@ def _arguments() -> argparse.ArgumentParser:
                       help='x, y, z and the leg positions are in mm, not in m')
     data.add_argument('--mm-positions', action='store_true', help='only x, y, z are in mm')
     data.add_argument('--mm-legs', action='store_true', help='only the leg positions are in mm')
-    data.add_argument('--degrees', action='store_true', help='angles are in degrees, not in rad')
+    data.add_argument('--degrees', action='store_true',
+                      help='angles, of the poses and of drives that turn, are in degrees, not in '
+                           'rad')
     data.add_argument('--drive-positions', action='store_true',
                       help='leg positions are those of drives whose screws turn with their legs '
                            '(drive.screw_rotation: universal): motor angles times lead / (2 pi '
@@ -70,12 +72,17 @@ def _arguments() -> argparse.ArgumentParser:
                       help='unknown: the device measures a target on the platform in a frame of '
                            'its own; both are calibrated as well (default: known)')
     data.add_argument('--noise', nargs=3, type=between(0.0, 1e3),
-                      metavar=('LENGTH', 'POSITION', 'ROTATION'),
-                      help='standard deviations of leg positions [m], of each coordinate of the '
-                           'poses [m] and of their rotation about each axis [rad] (default: '
-                           'estimated)')
+                      metavar=('DRIVE', 'POSITION', 'ROTATION'),
+                      help='standard deviations of leg positions [m] or angles of drives [rad], '
+                           'of each coordinate of the poses [m] and of their rotation about each '
+                           'axis [rad] (default: estimated)')
     add_reading(parser)
     calibrated = parser.add_argument_group('what is calibrated, and how')
+    calibrated.add_argument('--unknowns', type=names_of, default=('all',), metavar='GROUP,...',
+                            help='numbers that are calibrated, others keep the values of the '
+                                 'file: zero (of the drives; one pose is enough), joints, and of '
+                                 'drives that turn lengths and axes; several, as zero,lengths; '
+                                 'all (default)')
     calibrated.add_argument('--fixed', type=names_of, default=(), metavar='NAME,...',
                             help="parts that keep the file's values, as zero_length, "
                                  'base_joints.leg_1, platform_joints.leg_3.z')
@@ -97,7 +104,6 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.calibration.one_run import CalibrationOptions, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
     from stewart_dynamics.calibration.tracked_poses import read_tracked
-    from stewart_dynamics.legs import require_kind
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.tables.reading import is_table
@@ -105,11 +111,10 @@ def _run(given: argparse.Namespace) -> int:
     interrupt_on_signals()
     millimeters = Millimeters(given.mm or given.mm_positions, given.mm or given.mm_legs)
     options = CalibrationOptions(
-        given.fixed, given.frames, given.noise and Noise(*given.noise), given.hold_out,
-        millimeters, given.degrees, given.drive_positions, given.accept_mistakes, given.report,
-        given.force)
+        given.fixed, given.unknowns, given.frames, given.noise and Noise(*given.noise),
+        given.hold_out, millimeters, given.degrees, given.drive_positions, given.accept_mistakes,
+        given.report, given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
-    require_kind(parameters, 'calibration')
     if given.design is not None:
         _PROGRAM.say(design_command.run(given, parameters, given.output or Path(DESIGNED)))
         return DONE
@@ -121,9 +126,10 @@ def _run(given: argparse.Namespace) -> int:
             Reading.given(given), millimeters)
     elif given.pose and is_table(Path(given.pose)):
         measured = read_tracked(
-            given.poses, Path(given.pose), parameters, millimeters, Reading.given(given))
+            given.poses, Path(given.pose), parameters, millimeters, Reading.given(given),
+            given.degrees)
     else:
-        measured = read_poses(given.poses, parameters.joints, millimeters, given.degrees,
+        measured = read_poses(given.poses, parameters, millimeters, given.degrees,
                               Reading.given(given))
     _PROGRAM.prepare(likely_mistakes(parameters))
     result = run(measured, str(given.poses), parameters, output, options)

@@ -17,11 +17,13 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.calibration.assembly_errors import times_as_likely
 from stewart_dynamics.calibration.equations import (
-    BASE, Equations, GEOMETRY, inverse, PLATFORM, SAME, values_of, ZERO)
+    BASE, Equations, inverse, PLATFORM, SAME, values_of)
 from stewart_dynamics.calibration.frames import find_frames
 from stewart_dynamics.calibration.measured_poses import Millimeters
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.legs.calibrated import CalibratedLegs, ComparedPositions, listed
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
@@ -36,20 +38,24 @@ _ALIKE, _EXACT = 2.0, 1e-3
 # Largest scale of positions that is tried and how near, logarithms; a misfit above all others.
 _LARGEST_SCALE, _SCALE_STEP, _WORST = math.log(2.0), 1e-3, 1e3
 DEVICE_SCALE, LEG_SCALE = 'device', 'scale'
+# Fewer poses say nothing about mistakes that change the positions of a leg alike.
+_FEWEST = 4
 # A joint that moves by a larger part of the characteristic length is not of this hexapod.
 _FARTHEST = 0.3
 # Residuals above this part of it mean that the model does not describe the poses.
 _UNEXPLAINED = 0.03
-# Zero lengths that become a smaller part of the file's are those of whole lengths.
-_WHOLE = 0.1
 
 
 def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_frames: bool,
                       angles: Array | None, degrees: bool, millimeters: Millimeters,
                       ) -> Iterator[LikelyMistake]:
-    """Yield the likeliest mistake in lengths, poses or their angles (N, 3), if one is likely."""
+    """Yield the likeliest mistake in positions, poses or their angles (N, 3), if one is likely."""
+    if len(equations.positions) < _FEWEST:
+        yield from _on_other_side(parameters, equations, unknown_frames)
+        return
     given = _misfit(parameters, equations, unknown_frames)
-    without = list(_without_mistakes(parameters, equations, millimeters))
+    without = list(_without_mistakes(
+        parameters, equations, millimeters, degrees, unknown_frames))
     if angles is not None:
         rotation = from_euler(angles if degrees else np.radians(angles))
         text = ('the angles are in radians, not in degrees: without --degrees they are read so'
@@ -73,9 +79,18 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
         # Symmetric hexapods: a mirrored frame is another order of the legs.
         texts = [each.text for misfit, each in tried if misfit <= max(_ALIKE * best, _EXACT)]
         yield mistake._replace(text=f'{"; or ".join(texts)} (misfit {best:.2g} of the motion'
-                               + (f' instead of {given:.2g})' if given < math.inf else ')'))
+                               + (f' instead of {given:.2g}' if given < math.inf else '')
+                               + _likelihood(equations, best, given) + ')')
     else:
         yield from _on_other_side(parameters, equations, unknown_frames)
+
+
+def _likelihood(equations: Equations, best: float, given: float) -> str:
+    """Return how much likelier positions without a mistake are, in words; may be empty."""
+    count = equations.positions.size - 12  # less the middle and the scatter of each leg
+    if not equations.legs.signs or not 0.0 < best < given < math.inf or count < 1:
+        return ''
+    return f', {times_as_likely(count * math.log(given / best))} as likely'
 
 
 def _of_scale(parameters: Parameters, equations: Equations, unknown_frames: bool,
@@ -83,14 +98,14 @@ def _of_scale(parameters: Parameters, equations: Equations, unknown_frames: bool
     """Yield the smallest misfit of positions, or leg positions, of any scale, and the mistake."""
     from scipy.optimize import minimize_scalar
 
-    lengths, pose = equations.lengths, equations.pose
+    positions, pose = equations.positions, equations.pose
     for what, words, scaled in (
             (DEVICE_SCALE, 'positions of the device are {:.3g} times as large as they are by the '
              'legs: its calibration, or its target', lambda factor: equations._replace(
                  pose=Pose(pose.position / factor, pose.rotation))),
-            (LEG_SCALE, 'leg positions are {:.3g} times as large as they are by the device: lead '
-             'of the screw, gear or encoder', lambda factor: equations._replace(
-                 lengths=lengths / factor))):
+            (LEG_SCALE, f'{_name_of(equations)} are {{:.3g}} times as large as they are by the '
+             f'device: {equations.legs.scale_words}', lambda factor: equations._replace(
+                 positions=positions / factor))):
         found = minimize_scalar(
             lambda logarithm, scaled=scaled: min(_misfit(
                 parameters, scaled(math.exp(logarithm)), unknown_frames), _WORST),
@@ -109,8 +124,9 @@ def _on_other_side(parameters: Parameters, equations: Equations, unknown_frames:
     except StewartError:
         return
     pose = equations.in_base(frames)
-    determinants = lagrange.determinant(
-        lagrange.unchecked_legs(parameters, pose.position, pose.rotation))
+    with np.errstate(invalid='ignore'):  # poses out of reach
+        determinants = lagrange.determinant(
+            lagrange.unchecked_legs(parameters, pose.position, pose.rotation))
     if np.median(determinants) * determinant_at_home(parameters) < 0.0:
         yield LikelyMistake(
             'side', 'the poses are on the other side of the base than at home: likely a mirrored '
@@ -120,43 +136,42 @@ def _on_other_side(parameters: Parameters, equations: Equations, unknown_frames:
                f'; or geometry.platform_side, {parameters.geometry.platform_side}, is wrong'))
 
 
-def mistakes_of_result(parameters: Parameters, values: Array, residuals: Array, size: float,
+def mistakes_of_result(legs: CalibratedLegs, values: Array, residuals: Array, size: float,
                        ) -> Iterator[LikelyMistake]:
     """Yield likely mistakes that show in calibrated values and their residuals (N, 6)."""
+    parameters = legs.parameters
     left = float(np.sqrt(np.mean(residuals ** 2)))
     if left > _UNEXPLAINED * size:
         yield LikelyMistake('misfit', f'no geometry explains the poses: residuals of {_mm(left)} '
                             'mm remain; lengths and poses must be of the same instants')
-    start, joints = values_of(parameters), parameters.joints
-    zero = start[ZERO]
+    start, joints = values_of(legs), parameters.joints
     moved = np.linalg.norm((values - start)[:PLATFORM.stop].reshape(12, 3), axis=1)
     if moved.max() > _FARTHEST * size:
         worst = int(np.argmax(moved))
         where = 'base' if worst < BASE.stop // 3 else 'platform'
         yield LikelyMistake('far', f'the {where} joint of {joints[worst % 6]} would move by '
                             f'{_mm(moved[worst])} mm: the poses are not those of this hexapod')
-    off = np.abs(values[ZERO] - zero)
-    if (zero > _FARTHEST * size).all() and (np.abs(values[ZERO]) < _WHOLE * zero).all():
-        yield LikelyMistake(
-            'zero_length', 'the leg positions are whole lengths between the joints, not positions '
-            'from geometry.zero_length; if the hexapod publishes them so, it is zero')
-    elif off.max() > _FARTHEST * size:
-        worst = int(off.argmax())
-        yield LikelyMistake(
-            'zero_length', f'geometry.zero_length of {joints[worst]} would become '
-            f'{values[ZERO][worst]:.4g} m in place of {zero[worst]:.4g} m: are the leg positions '
-            'relative to home, or to another length?')
+    for what, text in legs.mistakes_of(values, size):
+        yield LikelyMistake(what, text)
+
+
+def _name_of(equations: Equations) -> str:
+    """Return the name of the measured positions of the drives."""
+    kind = equations.legs.parameters.leg_kind
+    return 'leg positions' if kind.position.unit == 'm' else f'{kind.position.field} of the legs'
 
 
 def _without_mistakes(parameters: Parameters, given: Equations, millimeters: Millimeters,
+                      degrees: bool, unknown_frames: bool,
                       ) -> Iterator[tuple[LikelyMistake, Equations]]:
     """Yield mistakes, each with the measurements as they were without it."""
-    lengths, pose = given.lengths, given.pose
-    for of_positions, of_legs in product((1.0, 1e-3, 1e3), repeat=2):
+    lengths, pose, legs = given.positions, given.pose, given.legs
+    unit, = legs.units.values()
+    for of_positions, of_legs in product((1.0, 1e-3, 1e3), (1.0, unit, round(1.0 / unit, 9))):
         if (of_positions, of_legs) != (1.0, 1.0):
-            words = _unit_words((of_positions, of_legs), millimeters)
+            words = _unit_words((of_positions, of_legs), millimeters, degrees, given)
             yield LikelyMistake('unit', words), given._replace(
-                lengths=of_legs * lengths,
+                positions=of_legs * lengths,
                 pose=Pose(of_positions * pose.position, pose.rotation))
     for axis, name in enumerate('xyz'):
         mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
@@ -173,27 +188,72 @@ def _without_mistakes(parameters: Parameters, given: Equations, millimeters: Mil
     yield LikelyMistake(
         'inverse', 'the rotations are those of the base in the platform frame: the inverse is '
         'needed'), given._replace(pose=Pose(pose.position, np.swapaxes(pose.rotation, 1, 2)))
-    yield LikelyMistake('sign', 'leg positions have the opposite sign: they must increase as a '
-                        'leg extends'), given._replace(lengths=-lengths)
+    yield LikelyMistake('sign', f'{_name_of(given)} have the opposite sign'
+                        + ('' if legs.signs else ': they must increase as a leg extends')), (
+        given._replace(positions=-lengths))
     joints = parameters.joints
-    for a, b in combinations(range(6), 2):
-        order = [{a: b, b: a}.get(leg, leg) for leg in range(6)]
-        yield LikelyMistake('swapped', f'{joints[a]} and {joints[b]} are swapped'), given._replace(
-            lengths=lengths[:, order])
+    orders = [('swapped', f'{joints[a]} and {joints[b]} are swapped', [
+        {a: b, b: a}.get(leg, leg) for leg in range(6)]) for a, b in combinations(range(6), 2)]
     for turn in range(6):
         rolled = [*range(turn, 6), *range(turn)]
         for order in (rolled, rolled[::-1]):
             names = ', '.join(joints[n] for n in order)
-            yield LikelyMistake('swapped', f'the legs are in another order: {names}'), (
-                given._replace(lengths=lengths[:, order]))
+            orders.append(('swapped', f'the legs are in another order: {names}', order))
+    for what, text, order in orders:
+        yield LikelyMistake(what, text), given._replace(positions=lengths[:, order])
+    if not legs.signs:
+        return
+    if unknown_frames:
+        for leg in range(6):
+            yield _reversed(given, [leg])
+        return
+    for what, text, order in [('', '', [*range(6)]), *(
+            each for each in orders if each[2] != [*range(6)])]:
+        ordered = given._replace(positions=lengths[:, order])
+        other_way = ordered._replace(positions=-ordered.positions)
+        better = np.flatnonzero(
+            _deviations(other_way) < _BETTER * _deviations(ordered)).tolist()
+        if better and len(better) < 6:
+            mistake, equations = _reversed(ordered, better)
+            yield (mistake._replace(what=what, text=f'{text}, and {mistake.text}') if what else
+                   mistake), equations
 
 
-def _unit_words(factors: tuple[float, float], given: Millimeters) -> str:
+def _reversed(given: Equations, legs: Sequence[int]) -> tuple[LikelyMistake, Equations]:
+    """Return the mistake that drives turn the other way, and the positions without it."""
+    positions = given.positions.copy()
+    positions[:, legs] *= -1.0
+    names = listed([given.legs.parameters.joints[leg] for leg in legs])
+    field = given.legs.parameters.leg_kind.position.field
+    turn = 'turns' if len(legs) == 1 else 'turn'
+    return LikelyMistake(
+        'reversed', f'{names} {turn} the other way: {field} of the opposite sign'), given._replace(
+            positions=positions)
+
+
+def _unit_words(factors: tuple[float, float], given: Millimeters, degrees: bool,
+                equations: Equations) -> str:
     """
     Return the wrong units of positions and leg positions, and the option that reads all of them.
 
-    factors: by which both must be multiplied.
+    factors: by which both must be multiplied. degrees: whether angles were read so.
     """
+    if equations.legs.parameters.leg_kind.position.unit == 'm':
+        return _length_words(factors, given)
+    of_positions, of_legs = factors
+    words = [] if of_positions == 1.0 else [_length_words((of_positions, 1.0), given)]
+    (unit, size), option = *equations.legs.units.items(), equations.legs.unit_option
+    if of_legs == size:
+        words.append(f'{_name_of(equations)} are in {unit}, not in rad'
+                     + ('' if degrees else f': {option} reads them so'))
+    elif of_legs != 1.0:
+        words.append(f'{_name_of(equations)} are in rad, not in {unit}'
+                     + (f': without {option} they are read so' if degrees else ''))
+    return '; '.join(words)
+
+
+def _length_words(factors: tuple[float, float], given: Millimeters) -> str:
+    """Return the same of lengths alone."""
     wrong: dict[str, list[str]] = {}
     fitting = list(given)
     for n, (factor, name) in enumerate(zip(factors, ('positions', 'leg positions'), strict=True)):
@@ -216,26 +276,43 @@ def _unit_words(factors: tuple[float, float], given: Millimeters) -> str:
 
 
 def _misfit(parameters: Parameters, equations: Equations, unknown_frames: bool) -> float:
-    """Return how far lengths are from those of the file, up to a constant, by their spread."""
+    """Return how far positions are from the file's, up to a constant, by their spread."""
     try:
-        frames = find_frames(parameters, equations) if unknown_frames else SAME
+        known = equations._replace(frames=find_frames(
+            parameters, equations) if unknown_frames else SAME)
     except StewartError:
         return math.inf
-
-    def spread(lengths: Array) -> float:
-        return float(np.linalg.norm(np.median(np.abs(lengths - np.median(lengths, 0)), axis=0)))
-
-    r = equations._replace(frames=frames).at(values_of(parameters, frames)).residuals
-    whole = max(spread(equations.lengths), spread(r + equations.lengths))
-    return spread(r) / whole if whole > 0.0 else math.inf
+    off, motions = _compared(known)
+    whole = max(map(_spread, motions))
+    return _spread(off) / whole if whole > 0.0 else math.inf
 
 
-def not_identified(joints: Sequence[str], shares: Array, largest: float, equations: Equations,
-                   size: float) -> str | None:
+def _spread(positions: Array) -> float:
+    return float(np.linalg.norm(np.median(
+        np.abs(positions - np.median(positions, 0)), axis=0)))
+
+
+def _compared(equations: Equations) -> ComparedPositions:
+    """Return positions by the file and measured ones."""
+    values = values_of(equations.legs, equations.frames)
+    return equations.legs.compared(
+        equations.vectors(values), equations.at(values).residuals, equations.positions)
+
+
+def _deviations(equations: Equations) -> Array:
+    """Return the median magnitudes (6,) of position errors, each leg about its median."""
+    off, _ = _compared(equations)
+    found: Array = np.median(np.abs(off - np.median(off, 0)), axis=0)
+    return found
+
+
+def not_identified(equations: Equations, shares: Array, largest: float, size: float,
+                   ) -> str | None:
     """Return which numbers the poses cannot distinguish and why, in words; None: all of them."""
-    unclear = shares[:GEOMETRY] > largest
+    legs, unclear = equations.legs, shares > largest
     if not unclear.any():
         return None
+    joints = legs.parameters.joints
     kinds = []
     for part, name in ((BASE, 'base joints'), (PLATFORM, 'platform joints')):
         of_axes: dict[tuple[bool, ...], list[str]] = {}
@@ -244,11 +321,11 @@ def not_identified(joints: Sequence[str], shares: Array, largest: float, equatio
             of_axes.setdefault(tuple(each.tolist()), []).append(axis)
         for of_legs, axes in of_axes.items():
             if any(of_legs):
-                legs = '' if all(of_legs) else ' of ' + _listed(
+                which = '' if all(of_legs) else ' of ' + listed(
                     [joint for joint, has in zip(joints, of_legs, strict=True) if has])
-                kinds.append(f'{name}{legs}' if len(axes) == 3 else
-                             f'{_listed(axes)} of the {name}{legs}')
-    kinds += ['zero lengths'] if unclear[ZERO].any() else []
+                kinds.append(f'{name}{which}' if len(axes) == 3 else
+                             f'{listed(axes)} of the {name}{which}')
+    kinds += [each.words for each in legs.own if unclear[legs.parts[each.name]].any()]
     middle = equations.pose.rotation.mean(axis=0)
     u, _, v = np.linalg.svd(middle)
     turns = 2.0 * to_quaternion(equations.pose.rotation @ (u @ v).T)[:, :3]
@@ -272,11 +349,7 @@ def not_identified(joints: Sequence[str], shares: Array, largest: float, equatio
     else:
         motion, more = 'the poses vary too little for their residuals', (
             'larger motions and more poses identify more')
-    return f'{motion}: {_listed(kinds)} cannot be distinguished; {more}'
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ' and '.join([', '.join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+    return f'{motion}: {listed(kinds)} cannot be distinguished; {more}'
 
 
 def _mm(meters: float) -> str:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 import math
 from pathlib import Path
 from typing import Any
@@ -15,16 +15,19 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.calibrate import Calibration
 from stewart_dynamics.calibration.calibration_results import (
-    frames_text, outlier_text, validation_text)
-from stewart_dynamics.calibration.equations import BASE, PLATFORM, ZERO
+    frames_text, noise_text, outlier_text, validation_text)
+from stewart_dynamics.calibration.equations import BASE, PLATFORM
 from stewart_dynamics.estimation.confidence_level import INTERVAL, TWO_SIDED
+from stewart_dynamics.legs.calibrated import Calibrated, listed
 from stewart_dynamics.reporting.estimates import FIXED, page_values
 from stewart_dynamics.reporting.pages import digits, page
 from stewart_dynamics.reporting.vector_picture import Chart, Picture, tick_text, ticks
 from stewart_dynamics.whole_file import write_files
 
 _FOLDER = Path(__file__).with_name('templates')
-_MM = 1e3
+_MM = _MILLI = 1e3
+# Size of a picture of changes, left margin, widths of charts by the numbers of a leg, gap [px].
+_PICTURE, _LEFT, _WIDTHS, _GAP = (1160, 350), 60.0, {1: 200.0, 2: 300.0, 3: 410.0}, 28.0
 # Length of the longest arrow in a view, by the radius of the joints.
 _ARROW = 0.35
 # Width of a character and height of a line of a label [px].
@@ -39,30 +42,54 @@ def write_report(path: Path, result: Mapping[str, Any], found: Calibration) -> N
     text = page(
         _FOLDER, 'calibration', document=True, r=result, name=Path(result['poses']['source']).name,
         validation=validation_text(result['validation']), frames=frames_text(result),
+        noise=noise_text(result['noise']), line=found.legs.line,
         outliers=[outlier_text(each) for each in result['outliers']],
         changes=_changes(found), views=[
-            _view(found, BASE, 'Base joints, from above', times),
-            _view(found, PLATFORM, 'Platform joints, from above', times)],
+            _view(found, part, f'{name} joints, from above', times)
+            for part, name in ((BASE, 'Base'), (PLATFORM, 'Platform'))
+            if any(state != FIXED for state in found.states[:PLATFORM.stop])],
         **page_values(result))
     write_files({path: text})
 
 
 def _changes(found: Calibration) -> str:
-    """Return a picture of all changes with their intervals."""
-    moved = _MM * (found.values - found.start)
-    halves = _MM * TWO_SIDED * np.where([each == FIXED for each in found.states], 0.0,
-                                        found.errors)
-    shown = np.abs(moved) + np.minimum(halves, np.abs(moved).max() + 1e-9)
-    end = max(float(shown.max()) * 1.08, 1e-9)
-    picture = Picture(1160, 350, f'Change of each joint coordinate and zero length [mm], with its '
-                      f'{INTERVAL}')
-    left = 60.0
-    for part, width, title, axes in (
-            (BASE, 410.0, 'base joints', 'xyz'), (PLATFORM, 410.0, 'platform joints', 'xyz'),
-            (ZERO, 200.0, 'zero lengths', ' ')):
-        count = part.stop - part.start
-        chart = Chart(picture, (left, 34.0, width, 220.0), (-0.6, count - 0.4), (-end, end))
-        _frame(picture, chart, title, left == 60.0)
+    """Return pictures of all changes with their intervals, of numbers of one unit each."""
+    rows: list[list[Calibrated]] = []
+    for each in found.legs.calibrated:
+        if rows and rows[-1][0].unit == each.unit and _LEFT + sum(
+                map(_width, (*rows[-1], each))) <= _PICTURE[0] + _GAP:
+            rows[-1].append(each)
+        else:
+            rows.append([each])
+    parts = found.legs.parts
+    return ''.join(_row(found, row) for row in rows if not all(
+        state == FIXED for each in row for state in found.states[parts[each.name]]))
+
+
+def _width(of: Calibrated) -> float:
+    """Return the width of the chart of a parameter with the gap beside it."""
+    return _WIDTHS[len(of.axes)] + _GAP
+
+
+def _row(found: Calibration, row: Sequence[Calibrated]) -> str:
+    """Return the picture of some parameters of one unit."""
+    places = [found.legs.parts[each.name] for each in row]
+    which = np.concatenate([np.arange(part.start, part.stop) for part in places])
+    moved = _MILLI * (found.values - found.start)
+    errors = np.where(np.isfinite(found.errors), found.errors, 0.0)
+    halves = _MILLI * TWO_SIDED * np.where(
+        [each == FIXED for each in found.states], 0.0, errors)
+    shown = np.abs(moved[which]) + np.minimum(
+        halves[which], np.abs(moved[which]).max() + 1e-9)
+    end, unit = max(float(shown.max()) * 1.08, 1e-9), f'm{row[0].unit}'
+    words = listed([each.words for each in row])
+    picture = Picture(*_PICTURE, f'Change of {words} [{unit}], with its {INTERVAL}')
+    left = _LEFT
+    for of, part in zip(row, places, strict=True):
+        count, axes = part.stop - part.start, _letters(of)
+        chart = Chart(picture, (left, 34.0, _WIDTHS[len(of.axes)], 220.0), (-0.6, count - 0.4),
+                      (-end, end))
+        _frame(picture, chart, f'{of.words} [{unit}]', left == _LEFT)
         for n in range(count):
             leg, axis = divmod(n, len(axes))
             value, half = moved[part][n], min(halves[part][n], 2.0 * end)
@@ -75,13 +102,18 @@ def _changes(found: Calibration) -> str:
             picture.text([x, 270.0], axes[axis], 'middle', css='tick')
             if axis == len(axes) // 2:
                 picture.text([x, 288.0], found.parameters.joints[leg], 'end', 45.0, css='tick')
-        left += width + 28.0
+        left += _width(of)
     return picture.svg()
+
+
+def _letters(of: Calibrated) -> Sequence[str]:
+    """Return the letters of the numbers of a leg: of joints their axes."""
+    return of.axes if len(of.axes) == 3 else '12' if len(of.axes) == 2 else ' '
 
 
 def _frame(picture: Picture, chart: Chart, title: str, first: bool) -> None:
     left, top, width, _ = chart.frame
-    picture.text([left, top - 12.0], f'{title} [mm]', css='view')
+    picture.text([left, top - 12.0], title, css='view')
     for value in ticks(*chart.y, 6):
         _, y = chart.at([0.0, value])
         picture.line([left, y], [left + width, y], css='zero' if value == 0.0 else 'grid')

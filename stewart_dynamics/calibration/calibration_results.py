@@ -17,6 +17,7 @@ from stewart_dynamics.calibration.equations import inverse
 from stewart_dynamics.calibration.frames import PoseErrors
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.estimation.confidence_level import PERCENT, TWO_SIDED
+from stewart_dynamics.legs.calibrated import ALL_GROUPS, CalibratedLegs
 from stewart_dynamics.mechanics.frames.motion import listed, Pose
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
@@ -34,7 +35,7 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
     what, joints = found.identifiability, found.parameters.joints
     lack = found.lack_of_fit
     legs, pose = measured.topics or (None, None)
-    units = ['m'] * len(found.names)
+    units, drive = found.legs.units_of(), found.parameters.leg_kind.position
     return {
         'version': VERSION, 'software': SOFTWARE,
         'date': now(),
@@ -42,16 +43,19 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
                   'used': found.poses, 'notices': list(measured.notices)},
         'options': dict(options),
         'parameters': [
-            estimate(name, 'm', start, value, state, error, share, False, not lack)
-            for name, start, value, state, error, share in zip(
-                found.names, found.start, found.values, found.states, found.errors, what.shares,
-                strict=True)],
+            estimate(name, unit, start, value, state, error, share, False,
+                     not lack and math.isfinite(error))
+            for name, unit, start, value, state, error, share in zip(
+                found.names, units, found.start, found.values, found.states, found.errors,
+                what.shares, strict=True)],
         'combinations': combined(what, found.names, units, found.values, found.covariance),
         'rank': what.rank, 'unknowns': len(found.names) - found.states.count(FIXED),
         'singular_values': what.singular_values,
         'not_identified': found.not_identified,
-        'noise': {'given': found.noise_given, 'length_m': found.noise.length,
-                  'position_m': found.noise.position, 'rotation_rad': found.noise.rotation},
+        'noise': None if not np.isfinite(found.errors).all() else {
+            'given': found.noise_given,
+            f'{drive.name}_{drive.unit}': found.noise.drive,
+            'position_m': found.noise.position, 'rotation_rad': found.noise.rotation},
         'frames': None if found.frames is None else {
             'device_in_base': _pose(found.frames.device),
             'target_in_platform': _pose(inverse(found.frames.target))},
@@ -68,6 +72,7 @@ def document(found: Calibration, measured: MeasuredPoses, source: str, options: 
         'lack_of_fit': None if not lack else {
             'cause': lack[0].what, 'text': '; '.join(each.text for each in lack),
             'intervals': 'none', 'causes': [each._asdict() for each in lack]},
+        'assembly': [each._asdict() for each in found.assembly],
         'likely_mistakes': [each._asdict() for each in found.likely],
         'calibrated': found.parameters.plain()}
 
@@ -98,6 +103,17 @@ def validation_text(held: Mapping[str, Any] | None) -> str:
             f'{after} by a fit to the others')
 
 
+def noise_text(noise: Mapping[str, Any] | None) -> str:
+    """Return the noise of drives and poses in words."""
+    if noise is None:
+        return 'no intervals: as many residuals as unknowns give no noise; --noise does'
+    drives = (f'leg positions {1e6 * noise["length_m"]:.2g} um' if 'length_m' in noise else
+              f'angles {1e3 * noise["angle_rad"]:.2g} mrad')
+    how = 'as given' if noise['given'] else 'estimated'
+    return (f'noise {how}: {drives}, poses {1e6 * noise["position_m"]:.2g} um and '
+            f'{1e6 * noise["rotation_rad"]:.2g} urad')
+
+
 def frames_text(result: Mapping[str, Any]) -> str:
     """Return the frames of the device in words; empty if they were known."""
     return '' if result['frames'] is None else '; '.join(
@@ -109,37 +125,41 @@ def frames_text(result: Mapping[str, Any]) -> str:
 
 def result_text(result: Mapping[str, Any]) -> str:
     """Return the content of calibration.json as text for the terminal."""
-    lack, noise = result['lack_of_fit'], result['noise']
+    lack = result['lack_of_fit']
     lines = textwrap.wrap(f'LACK OF FIT: {lack["text"]}', 100) if lack else []
+    lines += [line for each in result['assembly'] for line in textwrap.wrap(each['text'], 100)]
     lines += [
         *result['poses']['notices'],
         validation_text(result['validation']),
         f'residuals of the legs, RMS: {1e6 * result["residuals"]["before_rms_m"]:.3g} um by the '
         f'file, {1e6 * result["residuals"]["after_rms_m"]:.3g} um calibrated',
-        f'noise {"as given" if noise["given"] else "estimated"}: leg positions '
-        f'{1e6 * noise["length_m"]:.2g} um, poses {1e6 * noise["position_m"]:.2g} um and '
-        f'{1e6 * noise["rotation_rad"]:.2g} urad',
+        noise_text(result['noise']),
         *textwrap.wrap(frames_text(result), 100),
         *map(outlier_text, result['outliers']), '',
-        *table_lines(result['parameters'], 'calibrated')]
+        *table_lines(_asked(result), 'calibrated')]
     if result['not_identified']:
         lines += ['', *textwrap.wrap(result['not_identified'], 100)]
     return '\n'.join([*lines, *not_identifiable_lines(result, 'poses')])
 
 
-def comments(result: Mapping[str, Any]) -> dict[str, str]:
+def _asked(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the parameters; of some groups of unknowns without all that was not asked for."""
+    return [each for each in result['parameters']
+            if each['state'] != FIXED or ALL_GROUPS in result['options']['unknowns']]
+
+
+def comments(result: Mapping[str, Any], legs: CalibratedLegs) -> dict[str, str]:
     """Return the comments of calibrated.yaml by parameter: date and largest interval."""
-    texts = {}
-    for name in dict.fromkeys('.'.join(each['name'].split('.')[:2])
-                              for each in result['parameters']):
-        each = [row for row in result['parameters'] if row['name'].startswith(f'{name}.')]
+    texts: dict[str, str] = {}
+    for of in legs.calibrated:
+        each = result['parameters'][legs.parts[of.name]]
         halves = [TWO_SIDED * row['standard_error'] for row in each
                   if row['state'] == IDENTIFIED and row['interval']]
         kept = sum(row['state'] in (FIXED, NOT_IDENTIFIABLE) for row in each)
-        texts[name] = ', '.join([
+        texts |= dict.fromkeys(legs.written(of.name), ', '.join([
             f'calibrated {result["date"][:10]}' if kept < len(each) else 'kept',
-            *([f'{PERCENT}: within +-{max(halves):.2g} m'] if halves else []),
+            *([f'{PERCENT}: within +-{max(halves):.2g} {of.unit}'] if halves else []),
             *([f'{len(each) - len(halves) - kept} without an interval of its own']
               if 0 < len(halves) < len(each) - kept else []),
-            *([f'{kept} kept'] if 0 < kept < len(each) else [])])
+            *([f'{kept} kept'] if 0 < kept < len(each) else [])]))
     return texts

@@ -49,7 +49,7 @@ class PoseErrors(NamedTuple):
 
 def pose_errors(parameters: Parameters, equations: Equations, frames: Frames) -> PoseErrors:
     """Return how far forward kinematics of the measured legs is from the measured poses."""
-    found, solved = poses_of(parameters, equations.lengths, equations.in_base(frames))
+    found, solved = poses_of(parameters, equations.positions, equations.in_base(frames))
     computed, measured = equations.as_measured(found, frames), equations.pose
     turn = np.swapaxes(measured.rotation, 1, 2) @ computed.rotation
     angles = 2.0 * np.arcsin(np.minimum(np.linalg.norm(to_quaternion(turn)[:, :3], axis=1), 1.0))
@@ -58,16 +58,16 @@ def pose_errors(parameters: Parameters, equations: Equations, frames: Frames) ->
 
 
 def poses_of(parameters: Parameters, positions: Array, guess: Pose) -> tuple[Pose, Flags]:
-    """Return the poses (N,) of leg positions (N, 6), and where there is one; else the guess."""
+    """Return the poses (N,) of measured positions (N, 6), and where one exists; else the guess."""
     platform = StewartPlatform(parameters)
-    lengths = positions + parameters.geometry.zero_length
-    rows = np.array(np.broadcast_to(guess.rows, (len(lengths), guess.rows.shape[-1])))
+    given = parameters.leg_kind.calibrated_legs(parameters).drive_positions(positions)
+    rows = np.array(np.broadcast_to(guess.rows, (len(given), guess.rows.shape[-1])))
     try:
-        return platform.forward_kinematics(lengths, guess), np.ones(len(lengths), dtype=bool)
+        return platform.forward_kinematics(given, guess), np.ones(len(given), dtype=bool)
     except (PoseError, SingularityError):
         pass
-    solved = np.zeros(len(lengths), dtype=bool)
-    for n, each in enumerate(lengths):
+    solved = np.zeros(len(given), dtype=bool)
+    for n, each in enumerate(given):
         try:
             rows[n] = platform.forward_kinematics(each, Pose.of_rows(rows[n])).rows
             solved[n] = True
@@ -86,7 +86,7 @@ def find_frames(parameters: Parameters, equations: Equations) -> Frames:
         raise StewartError('poses must be turned about two axes or more, or the frames of the '
                            'device are not determined')
     found, solved = poses_of(
-        parameters, equations.lengths, StewartPlatform(parameters).home_pose())
+        parameters, equations.positions, StewartPlatform(parameters).home_pose())
     if np.count_nonzero(solved) < _FEWEST:
         raise StewartError(
             'the measured leg positions belong to no pose of this hexapod in '

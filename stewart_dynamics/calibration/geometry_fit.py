@@ -16,14 +16,13 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.calibration.equations import (
-    ALL, BASE, Equations, GEOMETRY, Linearization, PLATFORM)
+    BASE, DEVICE, Equations, FRAMES, Linearization, PLATFORM, TARGET)
 from stewart_dynamics.calibration.noise import (
     covariances, Noise, ROUNDING, VarianceComponents, whitening)
+from stewart_dynamics.legs.calibrated import CalibratedLegs
 from stewart_dynamics.mechanics.least_squares import (
     Identifiability, identifiability, LARGEST_ERROR, normal)
 
-# Change of a joint that would matter, by the characteristic length; the same of a frame's angles.
-_SCALE = 0.01
 # Rounds of noise and fit, until the noise changes by a smaller part.
 _ROUNDS, _SETTLED = 20, 0.01
 # A fit ends with a step that changes the residuals by a smaller part of them (least squares,
@@ -34,8 +33,8 @@ _DONE, _EXACT, _STEPS, _DAMPING = (1e-6, 1e-3), 1e-15, 100, 1e-3
 class Fit(NamedTuple):
     """Values that fit the poses best."""
 
-    values: Array  # (ALL,)
-    covariance: Array  # (ALL, ALL), of the known directions
+    values: Array  # (n,), n: geometry and frames
+    covariance: Array  # (n, n), of the known directions
     identifiability: Identifiability
     noise: Noise
     lin: Linearization
@@ -47,32 +46,34 @@ class Unknowns(NamedTuple):
 
     start: Array
     scales: Array
-    basis: Array  # (ALL, m): allowed changes by the scales, orthonormal
+    basis: Array  # (n, m): allowed changes by the scales, orthonormal
     size: float  # characteristic length of the hexapod [m]
 
     @classmethod
-    def of(cls, start: Array, size: float, fixed: Flags, frames: bool) -> Unknowns:
+    def of(cls, legs: CalibratedLegs, start: Array, size: float, fixed: Flags, frames: bool,
+           ) -> Unknowns:
         """
-        Return the unknowns.
+        Return the unknowns, which are not ``fixed``.
 
         Unknown frames of the device need a definition of base and platform frame: by joints that
         are fixed, or where the joints of the file fit best: their mean displacement and mean
         rotation are zero.
         """
-        scales = np.full(ALL, _SCALE * size)
-        scales[[*range(45, 48), *range(51, 54)]] = _SCALE
-        free = np.concatenate([~fixed, np.full(ALL - GEOMETRY, frames)])
+        scales = np.concatenate([legs.scales(size), np.full(FRAMES, legs.joint_scale * size)])
+        for part in (DEVICE, TARGET):
+            scales[part][3:] = legs.joint_scale
+        free = np.concatenate([~fixed, np.full(FRAMES, frames)])
         conditions = []
         for part in (BASE, PLATFORM) if frames else ():
             if fixed[part].any():
                 continue
             joints = start[part].reshape(6, 3)
             around = (joints - joints.mean(axis=0)) / size
-            rows = np.zeros((6, ALL))
+            rows = np.zeros((6, len(start)))
             rows[:3, part] = np.tile(np.eye(3), 6)
             rows[3:, part] = np.concatenate([np.cross(np.eye(3), each).T for each in around], 1)
             conditions.append(rows)
-        basis: Array = np.eye(ALL)[:, free]
+        basis: Array = np.eye(len(start))[:, free]
         if conditions:
             _, _, right = np.linalg.svd(np.concatenate(conditions) @ basis)
             basis = basis @ right[6 * len(conditions):].T
@@ -93,7 +94,7 @@ def fit(equations: Equations, unknowns: Unknowns, noise: Noise | None = None) ->
     """Return the best values for poses with the given noise, or with the noise estimated."""
     size, values, estimated = unknowns.size, unknowns.start, noise is None
     lin = equations.at(values)
-    noise, largest_error = noise or Noise(size, 0.0, 0.0), (
+    noise, largest_error = noise or Noise(size / lin.lever, 0.0, 0.0), (
         np.inf if estimated else LARGEST_ERROR)
     for _ in range(_ROUNDS):
         whiten = whitening(covariances(noise, size, lin))

@@ -13,23 +13,24 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.errors import StewartError
+from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.tables.column_names import (
-    ANGLES, leg_positions, POSITION, QUATERNION, ROTATION_VECTOR, ROTATIONS, TIME, U_V_W)
+    ANGLES, leg_angles, leg_positions, POSITION, Quantity, QUATERNION, ROTATION_VECTOR, ROTATIONS,
+    TIME, U_V_W)
 from stewart_dynamics.tables.named_table import NamedTable
 from stewart_dynamics.tables.reading import Reading
 
-# Minimum number of poses: one for each of the 7 unknowns of a leg, and one for the noise.
-FEWEST = 8
 _MOST = 20_000  # poses of a file
-_MILLIMETER, _DEGREE = 1e-3, np.pi / 180.0
+_METER, _MILLIMETER = 'm', 1e-3
+DEGREE = np.pi / 180.0
 
 
 class MeasuredPoses(NamedTuple):
     """N measured poses."""
 
-    lengths: Array  # (N, 6) positions of the legs [m]
+    positions: Array  # (N, 6), of the drives [m] or [rad]
     poses: Pose
     names: tuple[str, ...]  # of each pose, such as ``row 2``
     angles: Array | None = None
@@ -59,41 +60,62 @@ class Millimeters(NamedTuple):
 METERS = Millimeters()
 
 
-def read_poses(path: Path, joints: tuple[str, ...], millimeters: Millimeters = METERS,
+def read_poses(path: Path, parameters: Parameters, millimeters: Millimeters = METERS,
                degrees: bool = False, reading: Reading | None = None) -> MeasuredPoses:
     """
-    Return the poses of a file with the columns of ``joints``, x, y, z and a rotation.
+    Return the poses of a file with columns of the names of joints, x, y, z and a rotation.
 
     Units are those of the headings; without them m and rad, or ``millimeters`` and ``degrees``.
 
     Raises BagError if the file cannot be read, lacks a column, or has a value that is not a
     number.
     """
-    legs, (of_positions, of_legs) = leg_positions(joints), millimeters.units
-    radian = _DEGREE if degrees else 1.0
+    legs, of_positions = drive_columns(parameters), millimeters.units[0]
+    radian = DEGREE if degrees else 1.0
     table = NamedTable(path, (legs, TIME, POSITION, *ROTATIONS), reading, {
-        joints: of_legs, POSITION.columns: of_positions, **dict.fromkeys(
+        legs.columns: drive_unit(parameters, millimeters, degrees),
+        POSITION.columns: of_positions, **dict.fromkeys(
             (ANGLES.columns, U_V_W.columns, ROTATION_VECTOR.columns), radian)})
-    lengths, positions, rotations = (
+    drives, positions, rotations = (
         table.values(legs), table.values(POSITION), table.rotations())
-    if len(lengths) > _MOST:
-        raise StewartError(f'{path}: {len(lengths)} poses: at most {_MOST}')
+    if len(drives) > _MOST:
+        raise StewartError(f'{path}: {len(drives)} poses: at most {_MOST}')
     if rotations is None:
         raise StewartError(f'{path}: row {table.header_line}: has no column qx, qy, qz, qw (or '
                            f'roll, pitch, yaw); it has {table.headings}')
     pose = table.in_base_axes(np.hstack([positions, rotations.quaternions]), 'vq')
     plain = rotations.order == 'xyz' and table.plain_axes and rotations.angles is not None
     return MeasuredPoses(
-        lengths, Pose.from_quaternion(pose[:, :3], pose[:, 3:]),
+        drives, Pose.from_quaternion(pose[:, :3], pose[:, 3:]),
         tuple(f'row {line}' for line in table.lines),
         rotations.angles / radian if plain and rotations.angles is not None else None,
         notices=tuple(table.notices))
 
 
-def poses_csv(joints: tuple[str, ...], lengths: Array, poses: Pose) -> str:
-    """Return poses and leg positions as text that ``read_poses`` reads."""
+def drive_columns(parameters: Parameters) -> Quantity:
+    """Return the columns of the positions of the drives, with their units."""
+    turn = parameters.leg_kind.position.unit != _METER
+    return leg_angles(parameters.joints) if turn else leg_positions(parameters.joints)
+
+
+def drive_unit(parameters: Parameters, millimeters: Millimeters, degrees: bool) -> float:
+    """
+    Return the unit of positions of drives whose headings lack it, [m] or [rad].
+
+    ParameterError if lengths of legs were asked for, where drives turn.
+    """
+    if parameters.leg_kind.position.unit == _METER:
+        return millimeters.units[1]
+    if millimeters.legs and not millimeters.positions:
+        raise ParameterError(f'{millimeters.option}: {parameters.source}: positions of the legs '
+                             'are angles: --degrees reads them in degrees')
+    return DEGREE if degrees else 1.0
+
+
+def poses_csv(joints: tuple[str, ...], positions: Array, poses: Pose) -> str:
+    """Return poses and positions of drives as text that ``read_poses`` reads."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator='\n')
     table.writerow([*joints, *POSITION.columns, *QUATERNION.columns])
-    table.writerows(np.concatenate([lengths, poses.position, poses.quaternion], axis=1).tolist())
+    table.writerows(np.concatenate([positions, poses.position, poses.quaternion], axis=1).tolist())
     return text.getvalue()

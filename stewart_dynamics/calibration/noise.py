@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Noise of measured leg positions and poses.
+Noise of measured positions of drives and of poses.
 
-An error of a measured pose changes all six lengths at that pose, so the errors of its residuals
-are correlated: ``sigma_L^2 1 + sigma_x^2 S S^T + sigma_R^2 T T^T``, with the rows s and
-(arm x s) of the legs in S and T. Its diagonal alone would weight the legs one by one; with all of
+An error of a measured pose changes all six residuals at that pose, so their errors are
+correlated: ``sigma_q^2 D^2 + sigma_x^2 S S^T + sigma_R^2 T T^T``, with the derivatives by the
+positions of the drives in the diagonal D (of telescopic legs -1), and the rows s and (arm x s) of
+the legs in S and T. Its diagonal alone would weight the legs one by one; with all of
 it the standard errors of calibrated geometry are up to half as large (docs/calibration.md).
 """
 
@@ -22,8 +23,8 @@ from stewart_dynamics.calibration.equations import Linearization
 from stewart_dynamics.estimation.confidence_level import CONFIDENCE_LEVEL, TWO_SIDED
 from stewart_dynamics.mechanics.least_squares import normal
 
-# Lower bounds of standard deviations of the lengths: by the estimated noise of the poses, without
-# which some combinations of lengths could be exact; by the size of the hexapod, for exact data.
+# Lower bounds of standard deviations of positions: by the estimated noise of the poses, without
+# which some combinations of positions could be exact; by the size of the hexapod, for exact data.
 _LEAST, ROUNDING = 0.05, 1e-13
 # Relative information, squared, of directions that are combinations of others.
 _DEPENDENT = 1e-13
@@ -32,7 +33,7 @@ _DEPENDENT = 1e-13
 class Noise(NamedTuple):
     """Standard deviations."""
 
-    length: float  # of a measured leg position [m]
+    drive: float  # of a measured position of a drive [m] or [rad]
     position: float  # of a measured position, each coordinate [m]
     rotation: float  # of a measured rotation, about each axis [rad]
 
@@ -40,7 +41,8 @@ class Noise(NamedTuple):
 def covariances(noise: Noise, size: float, lin: Linearization) -> Array:
     """Return the covariance (N, 6, 6) of the residuals of each pose [m^2]."""
     least = ROUNDING * size + 1e-6 * math.hypot(noise.position, size * noise.rotation)
-    return np.asarray(max(noise.length, least) ** 2 * np.eye(6) + sum(
+    return np.asarray((np.maximum(
+        noise.drive * np.abs(lin.drives), least) ** 2)[..., None] * np.eye(6) + sum(
         deviation ** 2 * each @ np.swapaxes(each, 1, 2) for deviation, each in (
             (noise.position, lin.position), (noise.rotation, lin.rotation))))
 
@@ -59,20 +61,20 @@ class VarianceComponents(NamedTuple):
 
     units: Array  # A (3, N, 6, 6): W V_i W^T for a unit of variance i
     rows: Array  # Z (N, 6, n): orthonormal combinations of the weighted derivatives
-    known: Array
-    """(ALL, n): the same combinations of the unknowns; their covariance is known known^T."""
+    known: Array  # the same combinations of the unknowns; their covariance is known known^T
+    lever: float  # of the drives
 
     @classmethod
     def of(cls, lin: Linearization, whiten: Array, known: Array) -> VarianceComponents:
-        """Return the components of a fit along ``known`` (ALL, m)."""
-        sides = (whiten, whiten @ lin.position, whiten @ lin.rotation)
+        """Return the components of a fit along the columns of ``known``."""
+        sides = (whiten * lin.drives[:, None], whiten @ lin.position, whiten @ lin.rotation)
         rows = whiten @ (lin.derivatives @ known)
         scale = 1.0 / np.sqrt(np.sum(rows ** 2, axis=(0, 1)))
         squares, directions = np.linalg.eigh(normal(rows * scale, rows * scale))
         sound = squares > _DEPENDENT
         factor = scale[:, None] * directions[:, sound] / np.sqrt(squares[sound])
         return cls(np.stack([each @ np.swapaxes(each, 1, 2) for each in sides]), rows @ factor,
-                   known @ factor)
+                   known @ factor, lin.lever)
 
     def _projected(self) -> tuple[Array, Array, Array]:
         """Return A_i Z (3, N, 6, n), Z^T A_i Z (3, n, n), and the traces of P V_i P V_j (3, 3)."""
@@ -99,13 +101,13 @@ class VarianceComponents(NamedTuple):
         scale = 1.0 / np.sqrt(np.diag(traces))
         factor = np.linalg.cholesky(scale[:, None] * traces * scale + 1e-12 * np.eye(3))
         variances, _ = nnls(factor.T, np.linalg.solve(factor, scale * vector))
-        length, position, rotation = np.sqrt(scale * variances).tolist()
-        return Noise(max(length, _LEAST * math.hypot(position, size * rotation)), position,
-                     rotation)
+        drive, position, rotation = np.sqrt(scale * variances).tolist()
+        least = _LEAST * math.hypot(position, size * rotation) / self.lever
+        return Noise(max(drive, least), position, rotation)
 
     def covariance(self, estimated: bool) -> Array:
         """
-        Return how uncertain the unknowns are (ALL, ALL), more so if the noise is estimated.
+        Return how uncertain the unknowns are (n, n), more so if the noise is estimated.
 
         Errors of the estimated variances make weights that are not the best, and standard errors
         that are uncertain, each with its own degrees of freedom. Student's quantile for these, by

@@ -13,6 +13,7 @@ from stewart_dynamics.calibration.calibration_report import write_report
 from stewart_dynamics.calibration.calibration_results import comments, document
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses, METERS, Millimeters
 from stewart_dynamics.calibration.noise import Noise
+from stewart_dynamics.legs.calibrated import ALL_GROUPS
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.estimates import HOLD_OUT
@@ -25,6 +26,7 @@ class CalibrationOptions(NamedTuple):
     """Options of a calibration as ``calibrate`` takes them, and of its files."""
 
     fixed: tuple[str, ...] = ()
+    unknowns: tuple[str, ...] = (ALL_GROUPS,)
     frames: str = 'known'
     noise: Noise | None = None
     hold_out: float = HOLD_OUT
@@ -54,13 +56,14 @@ def run(measured: MeasuredPoses, source: str, parameters: Parameters, folder: Pa
     before = check_free(folder, options, CALIBRATION)
     remove_abandoned([folder])
     found = calibrate(
-        StewartPlatform(parameters), measured.lengths, measured.poses, fixed=options.fixed,
-        frames=options.frames, noise=options.noise, hold_out=options.hold_out,
+        StewartPlatform(parameters), measured.positions, measured.poses,
+        unknowns=options.unknowns, fixed=options.fixed, frames=options.frames,
+        noise=options.noise, hold_out=options.hold_out,
         angles=measured.angles, degrees=options.degrees, millimeters=options.millimeters,
         drive_positions=options.drive_positions, accept_mistakes=options.accept_mistakes)
     result = document(found, measured, source, options.shown())
     with whole_folder(folder, options, CALIBRATION, before) as partial:
-        found.parameters.to_yaml(partial / CALIBRATED_PARAMETERS, comments(result))
+        found.parameters.to_yaml(partial / CALIBRATED_PARAMETERS, comments(result, found.legs))
         write_json(partial / CALIBRATION, result)
         if options.report:
             write_report(partial / REPORT_PAGE, result, found)

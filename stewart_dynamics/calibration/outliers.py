@@ -29,7 +29,7 @@ class Outliers(NamedTuple):
 
     residuals: Array  # (N, 6) [m], of all poses
     deviations: Array  # (6,) robust standard deviations [m]
-    outlying: Flags  # (N, 6): which measured lengths are outliers
+    outlying: Flags  # (N, 6): which measured positions are outliers
     values: Array
 
     @property
@@ -43,7 +43,7 @@ class Outliers(NamedTuple):
 def outliers(equations: Equations, unknowns: Unknowns) -> Outliers:
     """Return the outliers, by a robust fit and then by fits to the other poses."""
     lin = equations.at(unknowns.start)
-    everything = np.ones(len(equations.lengths), dtype=bool)
+    everything = np.ones(len(equations.positions), dtype=bool)
 
     def fitted(deviation: float, largest_error: float, sound: Flags, robust: bool = False,
                ) -> Outliers:

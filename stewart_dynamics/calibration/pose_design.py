@@ -12,7 +12,7 @@ equal poses.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import io
 from typing import NamedTuple
 
@@ -20,12 +20,13 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.calibration.calibrate import check_number
-from stewart_dynamics.calibration.equations import Equations, GEOMETRY, names_of, values_of
+from stewart_dynamics.calibration.equations import (
+    Equations, GEOMETRY, held_by_groups, values_of)
 from stewart_dynamics.calibration.geometry_fit import Unknowns
 from stewart_dynamics.calibration.noise import covariances, Noise, whitening
 from stewart_dynamics.errors import MotionError, ParameterError, StewartError
 from stewart_dynamics.estimation.confidence_level import TWO_SIDED
-from stewart_dynamics.legs import require_kind
+from stewart_dynamics.legs.calibrated import ALL_GROUPS, CalibratedLegs
 from stewart_dynamics.mechanics.frames.motion import Motion, motion_rows, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.least_squares import LARGEST_ERROR
@@ -48,67 +49,72 @@ class PoseDesign(NamedTuple):
     """Designed poses in the order of their visit."""
 
     poses: Pose  # (N,)
-    lengths: Array  # (N, 6) leg positions to be commanded [m]
-    half_widths: Array  # (42,) predicted 95 % intervals [m]
-    random_half_widths: Array  # (42,) the same, median of as many random poses within the limits
-    names: tuple[str, ...]
+    positions: Array  # (N, 6) of the drives, to be commanded [m] or [rad]
+    half_widths: Array  # (n,) predicted 95 % intervals of the numbers of the geometry
+    random_half_widths: Array  # (n,) the same, median of as many random poses within the limits
+    legs: CalibratedLegs
 
 
 def design_poses(platform: StewartPlatform, count: int, noise: Noise = NOISE, seed: int = 0,
-                 ) -> PoseDesign:
+                 groups: Sequence[str] = (ALL_GROUPS,)) -> PoseDesign:
     """
     Return poses from which the geometry is identifiable, and its predicted intervals.
 
-    Raises ParameterError: a limit of length is missing, or home is not within the limits.
+    groups: of the unknowns, as ``calibrate`` takes them.
+
+    Raises ParameterError: a limit of the drives is missing, or home is not within the limits.
     Raises StewartError: too few poses are asked for, or within the limits.
     """
-    require_kind(platform.parameters, 'calibration')
-    check_number(count)
-    random = np.random.default_rng(seed)
     p = platform.parameters
+    legs = p.leg_kind.calibrated_legs(p)
+    held = held_by_groups(legs, groups)
+    check_number(count, legs, held)
+    random = np.random.default_rng(seed)
     candidates = _within_limits(platform, random, max(_CANDIDATES, 3 * count))
     if len(candidates) < 3 * count:
         raise StewartError(f'{len(candidates)} of {_TRIES * _CANDIDATES} random poses are within '
                            f'the limits: too few to choose {count}')
     size = p.singularity.characteristic_length
-    values = values_of(p)
-    unknowns = Unknowns.of(values, size, np.zeros(GEOMETRY, dtype=bool), False)
-    lin = Equations(np.zeros((len(candidates), 6)), candidates).at(values)
+    values = values_of(legs)
+    unknowns = Unknowns.of(legs, values, size, held, False)
+    positions = legs.measured_positions(platform.inverse_kinematics(candidates))
+    lin = Equations(legs, positions, candidates).at(values)
     whiten = whitening(covariances(noise, size, lin))
 
     def half_widths(which: Integers) -> Array:
         part = lin._replace(derivatives=lin.derivatives[which])
         what = unknowns.identifiability(part, whiten[which], LARGEST_ERROR)
         variances = np.sum((what.directions / np.maximum(what.singular_values, 1.0)) ** 2, axis=1)
-        return np.asarray(TWO_SIDED * what.scales * np.sqrt(variances))[:GEOMETRY]
+        return np.asarray(TWO_SIDED * what.scales * np.sqrt(variances))[GEOMETRY]
 
     deviations = np.sqrt(np.einsum('nll->nl', covariances(noise, size, lin)))
-    of_leg = [[*range(3 * n, 3 * n + 3), *range(18 + 3 * n, 21 + 3 * n), 36 + n]
-              for n in range(6)]
+    of_leg = [[n for n in legs.columns(leg) if not held[n]] for leg in range(6)]
     rows = np.stack([lin.derivatives[:, n, columns] / deviations[:, n, None]
-                     for n, columns in enumerate(of_leg)]) * unknowns.scales[0]
+                     * unknowns.scales[columns] for n, columns in enumerate(of_leg)])
     chosen = _exchange(rows, random.choice(len(candidates), count, replace=False))
     others = [half_widths(random.choice(len(candidates), count, replace=False))
               for _ in range(_RANDOM)]
     found = candidates[_in_order(candidates[chosen], platform.home_pose(), size, chosen)]
-    return PoseDesign(found, platform.inverse_kinematics(found) - p.geometry.zero_length,
-                      half_widths(chosen), np.median(others, axis=0), names_of(p))
+    return PoseDesign(found, legs.measured_positions(platform.inverse_kinematics(found)),
+                      half_widths(chosen), np.median(others, axis=0), legs)
 
 
 def _within_limits(platform: StewartPlatform, random: np.random.Generator, count: int) -> Pose:
     """Return random poses within all limits, on home's side of singularities."""
     p = platform.parameters
-    low, high = p.limits.length_min, p.limits.length_max
+    names = p.leg_kind.position_limits
+    low, high = (p[name] for name in names)
     if low is None or high is None:
-        raise ParameterError('limits.length_min and limits.length_max: needed for a design')
+        raise ParameterError(f'{names[0]} and {names[1]}: needed for a design')
     home, stroke = platform.home_pose(), high - low
     tries = _TRIES * count
-    spread = float(stroke.max())
+    spread = float(np.max(stroke * p.leg_kind.reach(p)))
     angle = min(spread / p.singularity.characteristic_length, _LARGEST_ANGLE)
     poses = Pose(home.position + random.uniform(-0.5, 0.5, (tries, 3)) * spread,
                  from_euler(random.uniform(-angle, angle, (tries, 3))) @ home.rotation)
-    lengths = platform.inverse_kinematics(poses)
-    sound = ((lengths > low + _MARGIN * stroke) & (lengths < high - _MARGIN * stroke)).all(axis=1)
+    positions = platform.solve(motion_rows(poses))[:, p.leg_kind.position.columns]
+    sound = ((positions > low + _MARGIN * stroke) & (
+        positions < high - _MARGIN * stroke)).all(axis=1)
     poses = poses[np.flatnonzero(sound)[:count]]
     known, motions = PoseLimits(p), motion_rows(poses)
     side, results = (platform.solve(rows) for rows in (motion_rows(home), motions))

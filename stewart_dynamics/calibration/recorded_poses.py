@@ -13,7 +13,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.calibration.measured_poses import MeasuredPoses, METERS, Millimeters
+from stewart_dynamics.calibration.measured_poses import (
+    drive_unit, MeasuredPoses, METERS, Millimeters)
 from stewart_dynamics.calibration.rests import find_rests, mean_pose, SETTLING, SHORTEST
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.mechanics.frames.motion import Pose
@@ -79,19 +80,20 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
         raise BagError(f'{path}: {" and ".join(topics)}: no valid message of the '
                        f'{"poses" if len(stamps) else "legs"}')
     order = np.argsort(stamps, kind='stable')
-    of_positions, of_legs = millimeters.units
-    stamps, lengths = stamps[order], of_legs * np.concatenate(leg_values)[order]
+    of_positions, of_legs = millimeters.units[0], drive_unit(parameters, millimeters, False)
+    stamps, positions = stamps[order], of_legs * np.concatenate(leg_values)[order]
     poses.sort()
     at = np.array([stamp for stamp, _ in poses])
     seen = np.array([values for _, values in poses])
     seen[:, :3] *= of_positions
     rows, names = [], []
-    for first, last in find_rests(
-            stamps, lengths, _STILL * parameters.singularity.characteristic_length, SECOND):
+    still = _STILL * parameters.singularity.characteristic_length / float(
+        np.mean(parameters.leg_kind.reach(parameters)))
+    for first, last in find_rests(stamps, positions, still, SECOND):
         margin = round(SETTLING * (stamps[last] - stamps[first]))
         begin, end = stamps[first] + margin, stamps[last] - margin
         part = seen[np.searchsorted(at, begin):np.searchsorted(at, end, 'right')]
-        legs = lengths[np.searchsorted(stamps, begin):np.searchsorted(stamps, end, 'right')]
+        legs = positions[np.searchsorted(stamps, begin):np.searchsorted(stamps, end, 'right')]
         if len(part) and len(legs):
             rows.append(np.concatenate([legs.mean(axis=0), mean_pose(part)]))
             names.append(f't = {(begin - stamps[0]) / SECOND:.1f} s')

@@ -51,7 +51,7 @@ _ROUNDING, _DEPENDENT = 1e-12, 1e-13
 _SEEN, _MOVE = 1e-6, 10.0
 # Numbers of poses on either side of a split at least, and of splits of one quantity at most.
 _FEWEST, _SPLITS = 2, 19
-_OF_A_LEG = 7  # unknowns
+_LEAST_POSES = 8  # fewer have too few residuals to say why
 _ALL = 'all legs'
 _ALIKE = f'{_ALL} alike'
 # The joints decide between the scales of legs and of the device if they move by half as much.
@@ -62,13 +62,13 @@ _FIXED, _EITHER, _TURNS, _DEFLECTION, _POSE, _DRIFT, _PLAY, _NOISE = (
 _UNEXPLAINED = 'unexplained'
 _LACKS = {
     _FIXED: 'the fixed values are not those of the hexapod',
-    _SCALE: 'positions off by scale, from the lead of the screw or the encoder',
+    _SCALE: 'positions off by scale, from {scale}',
     _DEVICE: 'positions of the device off by scale, from its calibration or its target',
-    _EITHER: 'the scale of all legs, from lead or encoder, or that of the device: the joints of '
+    _EITHER: 'the scale of all legs, from {short}, or that of the device: the joints of '
              'the file do not decide which',
     _TURNS: 'positions follow the turns of the legs about their axes, as those of drives whose '
             'screws turn with the legs (--drive-positions, drive.*)',
-    _DEFLECTION: 'residuals follow the static forces of the legs, from deflection',
+    _DEFLECTION: 'residuals follow the {force}, from deflection',
     _POSE: 'residuals depend on the pose, from joints without a common center or deflection',
     _DRIFT: 'residuals drift from the first pose to the last',
     _PLAY: 'play, a loose joint or encoder',
@@ -177,16 +177,16 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
     """
     Return the causes of residuals that are more than noise, the likeliest first.
 
-    ``equations`` are N poses without outliers, ``found`` a fit to them, ``fixed`` (42,) the
+    ``equations`` are N poses without outliers, ``found`` a fit to them, ``fixed`` (n,) the
     numbers that keep the file's values, and ``whitened`` (N, 6) residuals by the noise that was
     given. A leg with a cause is left out before others are looked for.
     """
     from scipy.stats import chi2
 
     deviation = math.sqrt(np.mean(found.lin.residuals ** 2))
-    if deviation < _ROUNDING * unknowns.size or (
-            equations.lengths.std(axis=0).max() < _MOVE * deviation):
-        return ()  # rounding errors, or one and the same pose
+    if len(equations.positions) < _LEAST_POSES or deviation < _ROUNDING * unknowns.size or (
+            found.lin.lever * equations.positions.std(axis=0).max() < _MOVE * deviation):
+        return ()  # a few poses, rounding errors, or one and the same pose
     terms, sides = _terms(platform, equations, found, fixed)
     scales = _scales(equations, found, unknowns)
     names = platform.parameters.joints
@@ -198,7 +198,8 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
         residuals = _Residuals.of(found, unknowns, legs)
         if residuals.freedom < 1:
             break
-        tried = sorted([*_causes(residuals, legs, terms, sides, names, scatter), *(
+        tried = sorted([*_causes(
+            residuals, legs, equations.legs.of_a_leg, terms, sides, names, scatter), *(
             _Cause(residuals.of_terms(each[:, legs]), what, tuple(legs), (
                 f'{_ALIKE} ({-residuals.of_each(each[:, legs])[1][0]:+.2%})'))
             for what, each in scales.items())], reverse=True)
@@ -213,7 +214,10 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
             causes.append((best.what, best.text) if len(likely) == 1 else (
                 _UNEXPLAINED, f'{best.text}, {" or ".join(likely)}'))
         legs = [leg for leg in legs if leg not in best.legs]
-    lacks = [LikelyMistake(what, f'{_LACKS[what]}: ' + ', '.join(
+    legs_of_file = equations.legs
+    words = {'scale': legs_of_file.scale_cause, 'short': legs_of_file.scale_short,
+             'force': legs_of_file.force_words}
+    lacks = [LikelyMistake(what, f'{_LACKS[what].format_map(words)}: ' + ', '.join(
         text for each, text in causes if each == what))
         for what in dict.fromkeys(what for what, _ in causes)]
     if whitened is not None and not lacks:
@@ -234,7 +238,7 @@ def _scales(equations: Equations, found: Fit, unknowns: Unknowns) -> dict[str, A
     size. The one that leaves the joints much nearer to the file is kept, or both.
     """
     pose = equations.pose.position @ equations.frames_at(found.values).device.rotation.T
-    terms = {_SCALE: equations.lengths[..., None],
+    terms = {_SCALE: (-found.lin.drives * equations.positions)[..., None],
              _DEVICE: -np.sum(found.lin.position * pose[:, None], axis=-1)[..., None]}
     rows = found.lin.derivatives.reshape(-1, len(unknowns.scales)) @ (
         unknowns.scales[:, None] * unknowns.basis)
@@ -252,7 +256,7 @@ def _scales(equations: Equations, found: Fit, unknowns: Unknowns) -> dict[str, A
 def _terms(platform: StewartPlatform, equations: Equations, found: Fit, fixed: Flags,
            ) -> tuple[dict[str, Array], list[Array]]:
     """Return the terms (N, 6, k) of each cause, and quantities (N, 6) that give sides of play."""
-    count = len(equations.lengths)
+    count = len(equations.positions)
     pose = equations.in_base(equations.frames_at(found.values))
     seen = np.concatenate([pose.position, to_euler(pose.rotation)], axis=1)
     u = (seen - seen.mean(axis=0)) / np.maximum(seen.std(axis=0), 1e-12)
@@ -260,22 +264,22 @@ def _terms(platform: StewartPlatform, equations: Equations, found: Fit, fixed: F
     # Lengths are nearly quadratic in the pose themselves: cubic terms, too.
     of_pose = np.concatenate([*(u[:, a:a + 1] * u[:, a:] for a in range(6)), u ** 3], axis=1)
     of_all = {_POSE: of_pose, _DRIFT: np.concatenate([time, time ** 2], axis=1)}
-    forces = np.nan_to_num(platform.inverse_dynamics(
-        Motion.from_pose(pose), singular='nan').forces)
-    moves = np.diff(equations.lengths, axis=0, prepend=equations.lengths[:1])
-    moved = np.abs(moves) > _MOVE * np.sqrt(np.mean(found.lin.residuals ** 2))
+    efforts = np.nan_to_num(getattr(platform.inverse_dynamics(
+        Motion.from_pose(pose), singular='nan'), platform.parameters.leg_kind.effort.field))
+    moves = np.diff(equations.positions, axis=0, prepend=equations.positions[:1])
+    moved = found.lin.lever * np.abs(moves) > _MOVE * np.sqrt(np.mean(found.lin.residuals ** 2))
     last = np.maximum.accumulate(np.where(moved, np.arange(count)[:, None], 0), axis=0)
     return {
-        _FIXED: found.lin.derivatives[..., :GEOMETRY][..., fixed],
-        _SCALE: equations.lengths[..., None],
+        _FIXED: found.lin.derivatives[..., GEOMETRY][..., fixed],
+        _SCALE: (-found.lin.drives * equations.positions)[..., None],
         _TURNS: equations.turns(found.values)[..., None],
-        _DEFLECTION: forces[..., None],
+        _DEFLECTION: (-found.lin.drives * efforts)[..., None],
         **{what: np.repeat(each[:, None], 6, axis=1) for what, each in of_all.items()}}, [
-            forces, *(np.repeat(each[:, None], 6, axis=1) for each in u.T),
-            equations.lengths, np.take_along_axis(moves, last, axis=0)]
+            efforts, *(np.repeat(each[:, None], 6, axis=1) for each in u.T),
+            equations.positions, np.take_along_axis(moves, last, axis=0)]
 
 
-def _causes(residuals: _Residuals, legs: Sequence[int], terms: dict[str, Array],
+def _causes(residuals: _Residuals, legs: Sequence[int], of_a_leg: int, terms: dict[str, Array],
             sides: Sequence[Array], names: Sequence[str], scatter: Sequence[str],
             ) -> Iterator[_Cause]:
     """Yield the causes of larger residuals of single legs, and of all."""
@@ -290,7 +294,7 @@ def _causes(residuals: _Residuals, legs: Sequence[int], terms: dict[str, Array],
 
     for what, each in terms.items():
         # As many terms as poses explain any scatter.
-        few = each.shape[2] + _OF_A_LEG > count
+        few = each.shape[2] + of_a_leg > count
         for leg in legs:
             yield _Cause(residuals.of_noise(place[leg]) if what == _POSE and few else
                          residuals.of_terms(of_legs(each, [leg])), what, (leg,), names[leg] + (

@@ -15,6 +15,7 @@ from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
+from stewart_dynamics.legs.crank_calibration import CrankCalibration
 from stewart_dynamics.legs.kind import (
     AtHome, IntervalBounds, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import (
@@ -263,6 +264,10 @@ class Crank(LegKind):
         _, r = _tangent_and_row(at)
         on_legs: Array = forces + torque * r
         return on_legs
+
+    def calibrated_legs(self, parameters: Parameters) -> CrankCalibration:
+        """Return numbers and equations of the legs."""
+        return CrankCalibration(parameters)
 
     def stop_loads(self, parameters: Parameters) -> StopLoads:
         """

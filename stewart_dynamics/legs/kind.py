@@ -21,6 +21,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Records
 from stewart_dynamics.core.binding import KINDS, places
 from stewart_dynamics.errors import ParameterError, shown
+from stewart_dynamics.legs.calibrated import CalibratedLegs
 from stewart_dynamics.legs.lines import AnchorCircles, Lines
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, UNIVERSAL
 from stewart_dynamics.legs.tree import LegBranch
@@ -368,6 +369,10 @@ class LegKind(ABC):
         felt: acceleration less gravity of points (..., k, 3) at rest on the base. spin, spin_rate
         (..., 3): angular velocity and acceleration of the base.
         """
+
+    @abstractmethod
+    def calibrated_legs(self, parameters: Parameters) -> CalibratedLegs:
+        """Return the numbers of the geometry that a calibration finds, and their equations."""
 
     def reach(self, parameters: Parameters) -> Array:
         """Return the movement of a platform joint by that of its drive, at the best (6,)."""

@@ -16,6 +16,7 @@ from stewart_dynamics.legs.kind import (
     IntervalBounds, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
 from stewart_dynamics.legs.lines import Lines, lines_from, per_leg, skew, transposed
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, SLIDE, UNIVERSAL
+from stewart_dynamics.legs.telescopic_calibration import TelescopicCalibration
 from stewart_dynamics.legs.tree import BARREL, LegBranch, ROD
 
 if TYPE_CHECKING:
@@ -186,6 +187,10 @@ class Telescopic(LegKind):
             + (per_leg(terms.inertia * at.lengths) * terms.across @ carried[..., None])[..., 0]
             - (moment * q_squared)[..., None] * at.directions)
         return on_legs
+
+    def calibrated_legs(self, parameters: Parameters) -> TelescopicCalibration:
+        """Return numbers and equations of the legs."""
+        return TelescopicCalibration(parameters)
 
     def stop_loads(self, parameters: Parameters) -> StopLoads:
         """Return reflected masses, and the pistons, which move with the platform."""

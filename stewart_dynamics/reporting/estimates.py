@@ -106,7 +106,8 @@ def table_lines(parameters: Sequence[Mapping[str, Any]], column: str) -> list[st
     for each in parameters:
         if each['state'] == IDENTIFIED:
             error = each['standard_error']
-            shown = f'{rounded(each["value"], error):>12}', 'no interval'
+            value = f'{each["value"]:.5g}' if error is None else rounded(each['value'], error)
+            shown = f'{value:>12}', 'no interval'
             if each['interval']:
                 shown = shown[0], ' .. '.join(rounded(end, error) for end in each['interval'])
             remark = '  at its bound' if each['at_bound'] else ''

@@ -74,6 +74,11 @@ def leg_positions(joints: Sequence[str]) -> Quantity:
     return Quantity(tuple(joints), _LENGTHS)
 
 
+def leg_angles(joints: Sequence[str]) -> Quantity:
+    """Return the quantity of the angles of legs whose drives turn, likewise."""
+    return Quantity(tuple(joints), _ANGLES)
+
+
 def si_factor(quantity: Quantity, unit: str) -> float | None:
     """Return a unit in SI; None if the quantity does not have it."""
     if not unit:
