@@ -101,7 +101,7 @@ static void move_base(const one_plant * plant, double part, stewart_base * base)
 typedef struct { stewart_motion motion; double efforts[6], torques[6]; } driven_motion;
 
 /* Write a state's time derivative under its loads and a motion of the base. */
-static driven_motion differentiate(
+ONCE static driven_motion differentiate(
   const stewart_platform * platform, const one_plant * plant, const plant_state * state,
   const stewart_base * base, plant_state * slope) {
   driven_motion of;
@@ -150,7 +150,7 @@ static driven_motion differentiate(
 
 /* Write the positions, rates and levers of the legs; return the largest of the angular speed and of
    how fast they change [1/s]; infinite where a leg has no length or does not reach. */
-static double write_legs(
+ONCE static double write_legs(
   const stewart_platform * platform, const plant_state * state, one_plant * plant) {
   stewart_motion motion = {{0.0}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}};
   vector omega = read3(state->twist + 3);

@@ -141,14 +141,15 @@ def unreached(joints: Sequence[str], distances: Array) -> str:
 
 
 def in_parts(compute: Callable[..., object], constants: tuple[Any, ...], *arrays: NDArray[Any],
-             ) -> None:
+             least: int = _SAMPLES_FOR_A_THREAD) -> None:
     """
     Call a function with constants and rows of arrays; large batches in parts on all processors.
 
     The first array has as many rows as there are samples. One with a single row is for all parts.
+    least: samples for one thread at least.
     """
     samples = len(arrays[0])
-    threads = min(_CPUS, samples // _SAMPLES_FOR_A_THREAD)
+    threads = min(_CPUS, samples // least)
     if threads < 2:
         compute(*constants, *arrays)
         return
