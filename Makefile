@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
-  bench-replay bench-response clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship docs docs-site export-demo installed \
+  bench-replay bench-response clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship demo-tune docs docs-site export-demo installed \
   lint lint-flake8 lint-layers lint-mypy lint-pep257 lint-ruff test tools
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
@@ -124,6 +124,10 @@ demo-mujoco: $(INSTALLED)
 
 demo-ship: $(INSTALLED)
 	@$(VENV)/bin/python demo/ship.py
+
+# Gymnasium is one of the tools.
+demo-tune: $(TOOLS)
+	@$(VENV)/bin/python demo/tune.py
 
 demo-calibrate: $(INSTALLED)
 	@$(VENV)/bin/python demo/calibrate.py

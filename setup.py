@@ -54,6 +54,7 @@ extras_require = {
         'sphinx>=7.3.7',  # for this docutils; 7.3.0 warns of any type of a setting
     ],
     'gpu': ['cupy-cuda12x>=13'],
+    'gym': ['gymnasium>=1.1'],  # for examples/hexapod_env.py
     'live': ['websockets>=13'],  # for examples/live_view.py
     'mujoco': ['mujoco>=3.14'],  # before, inertias have errors of 1e-5
     'parquet': ['pyarrow>=14'],

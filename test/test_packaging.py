@@ -36,7 +36,7 @@ SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch', 'test', N
 # Modules whose rosdep key is not their own name; '' where rosdep has no key, as in package.xml.
 KEYS = {
     'cupy': '', 'dask': '', 'distributed': '', 'docutils': 'python3-docutils',
-    'hypothesis': 'python3-hypothesis', 'jinja2': 'python3-jinja2', 'lz4': '',
+    'gymnasium': '', 'hypothesis': 'python3-hypothesis', 'jinja2': 'python3-jinja2', 'lz4': '',
     'matplotlib': 'python3-matplotlib', 'mcap': 'mcap-ros2-support',
     'mcap_ros2': 'mcap-ros2-support', 'mujoco': 'python3-mujoco-pip',
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
