@@ -18,6 +18,7 @@ from stewart_dynamics.gpu.device import count_devices, Device, device_of
 from stewart_dynamics.gpu.given_arrays import leading, spread, take_array, take_mask
 from stewart_dynamics.gpu.host import Host
 from stewart_dynamics.gpu.own_structures import own_structures
+from stewart_dynamics.gpu.uncertain_structures import uncertain_structures
 from stewart_dynamics.mechanics.arguments import wrong_type
 from stewart_dynamics.mechanics.batch import WIDTHS
 from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
@@ -84,6 +85,9 @@ class Hexapods:
     parameters : mapping of names to arrays (N,) or (N, n), optional
         Values of single parameters for each hexapod: ``{'payload.mass': masses}``. End stops keep
         the springs and dampers of the platform.
+    uncertainty : int, optional
+        Seed by which hexapods are drawn that the file admits, by ``uncertainty.*``, in place of
+        ``parameters``.
     device : str
         'cpu', 'cuda', 'cuda:1', ...; '': the first GPU if there is one, else the CPU.
 
@@ -109,7 +113,7 @@ class Hexapods:
 
     def __init__(self, platforms: StewartPlatform | Parameters | Sequence[Any],
                  count: int | None = None, parameters: Mapping[str, ArrayLike] | None = None, *,
-                 device: str = '') -> None:
+                 uncertainty: int | None = None, device: str = '') -> None:
         several = list(platforms) if isinstance(platforms, list | tuple) else [platforms]
         self._parameters = [_parameters_of(each) for each in several]
         if not self._parameters:
@@ -120,13 +124,20 @@ class Hexapods:
         self.count = number if count is None else count
         if not isinstance(self.count, int) or self.count < 1 or self.count % number:
             raise wrong_type('count', count, f'a positive multiple of {number} platforms')
+        if uncertainty is not None and parameters:
+            raise wrong_type('uncertainty', uncertainty, 'None where parameters are given')
         self._backend: Any = _backend_of(device)
         self.xp: Any = self._backend.xp
         self.device: str = self._backend.name
         blocks = np.repeat(np.arange(number), self.count // number)
         self._own: Mapping[str, ArrayLike] = dict(parameters or {})
         try:
-            if self._own:
+            if uncertainty is not None:
+                structures = np.concatenate([
+                    uncertain_structures(each, self.count // number, uncertainty + n)
+                    for n, each in enumerate(self._parameters)])
+                blocks = np.arange(self.count)
+            elif self._own:
                 structures = np.concatenate([
                     own_structures(each, {name: np.asarray(value)[blocks == n]
                                           for name, value in self._own.items()},
@@ -156,6 +167,10 @@ class Hexapods:
     def __repr__(self) -> str:
         """Return number, kind of legs and device."""
         return f'<Hexapods: {self.count} with {self._kind.name} legs on {self.device}>'
+
+    def to_host(self, array: Any) -> Any:
+        """Return an array as one of numpy; from a GPU it is copied."""
+        return array if isinstance(array, np.ndarray) else self.xp.asnumpy(array)
 
     # ---- results of motions ---------------------------------------------------------------------
 

@@ -41,7 +41,7 @@ def own_structures(parameters: Parameters, values: Mapping[str, ArrayLike], coun
     """
     checked = {name: _checked_values(parameters, name, value, count)
                for name, value in values.items()}
-    structures, payloads = _copies(parameters, count)
+    structures, payloads = copies(parameters, count)
     fields = fields_of(parameters)
     for name, rows in checked.items():
         if name in _PAYLOAD:
@@ -77,7 +77,7 @@ def fields_of(parameters: Parameters) -> dict[str, tuple[bool, str]]:
         name: (False, field) for field, name in PLATFORM_FIELDS.items()}
 
 
-def _copies(parameters: Parameters, count: int) -> tuple[Any, Array]:
+def copies(parameters: Parameters, count: int) -> tuple[Any, Array]:
     """Return structures (count,) without payload, before what follows is set, and the payload."""
     one: Any = limited_structure(parameters).copy()
     one['mass'], one['center_of_mass'], one['inertia'] = parameters.platform.body

@@ -605,7 +605,8 @@ class CueingGroup(ParameterGroup):
 
 def _deviation(text: str, unit: str, default: float | None) -> Any:
     return declare(f'standard deviation of {text}; a prior of stewart_identify and '
-                   '~/identify_payload', unit, default, minimum=0.0)
+                   '~/identify_payload, drawn by stewart_replay --uncertainty', unit, default,
+                   minimum=0.0)
 
 
 class UncertaintyGroup(ParameterGroup):
