@@ -323,6 +323,12 @@ def test_errors(snapshot: Snapshot) -> None:
         snapshot(f'{name}: {type(error.value).__name__}: {error.value}')
 
 
+def test_too_little_memory_is_one_line() -> None:
+    rows = np.broadcast_to(np.zeros((1, 24)), (10 ** 12, 1, 24))
+    with pytest.raises(DeviceError, match='^inverse_dynamics: too little memory: [^\n]+$'):
+        Hexapods(PLATFORM, device='cpu').inverse_dynamics(rows)
+
+
 def test_errors_have_types() -> None:
     hexapods = Hexapods(PLATFORM, 2, device='cpu')
     with pytest.raises(ReachError):

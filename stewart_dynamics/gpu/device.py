@@ -44,7 +44,7 @@ def count_devices() -> int:
 
 class Device:
     """
-    One GPU, see ``host.Host`` for the same on the CPU.
+    One GPU, see ``host.Host`` for the same on the CPU; it becomes CuPy's present device.
 
     Kernels are compiled when they are first needed, by NVRTC, and kept in CuPy's cache. They run
     in the present stream of CuPy.
@@ -55,6 +55,7 @@ class Device:
         if not 0 <= number < count:
             raise DeviceError(f'cuda:{number}: no such GPU: there are {count}, from cuda:0')
         self.xp, self.number, self.name = _cupy(), number, f'cuda:{number}'
+        self.xp.cuda.Device(number).use()
 
     @cached_property
     def _module(self) -> Any:
@@ -68,13 +69,8 @@ class Device:
     def empty(self, shape: tuple[int, ...]) -> Any:
         """Return an array whose numbers of a kind lie side by side, as threads read them."""
         with self.xp.cuda.Device(self.number):
-            try:
-                # The last axis, of the numbers of a sample, is the slowest.
-                whole = self.xp.empty((shape[-1], *shape[:-1]))
-            except self.xp.cuda.memory.OutOfMemoryError as exc:
-                raise DeviceError(f'{self.name}: too little memory for an array {shape}, '
-                                  f'{_gibibytes(8 * int(np.prod(shape)))}') from exc
-            return self.xp.moveaxis(whole, 0, -1)
+            # The last axis, of the numbers of a sample, is the slowest.
+            return self.xp.moveaxis(self.xp.empty((shape[-1], *shape[:-1])), 0, -1)
 
     def put(self, records: Records) -> Any:
         """Return structures in the GPU's memory; where they do not fit, as they are."""
@@ -91,11 +87,11 @@ class Device:
 
         Structures that do not fit in memory come to the GPU in parts, with their hexapods.
         """
-        if all(not isinstance(each, np.ndarray) for each in structures):
+        if not any(map(_on_host, structures)):
             self._launch(name, structures, which, numbers, arrays, flags)
             return
         count = len(which)
-        if any(isinstance(each, np.ndarray) and len(each) != count for each in structures):
+        if any(_on_host(each) and len(each) != count for each in structures):
             raise DeviceError(f'{self.name}: too little memory for the structures of the '
                               'platforms')
         with self.xp.cuda.Device(self.number):
@@ -106,13 +102,9 @@ class Device:
             of = slice(begin, min(begin + part, count))
             rows = tuple(array if array.shape[0] == 1 else array[of] for array in arrays)
             with self.xp.cuda.Device(self.number):
-                try:
-                    moved = tuple(self.xp.asarray(
-                        each[of].view(np.uint8) if isinstance(each, np.ndarray)
-                        else each.reshape(count, -1)[of]) for each in structures)
-                except self.xp.cuda.memory.OutOfMemoryError as exc:
-                    raise DeviceError(f'{self.name}: too little memory for one part of '
-                                      f'{part} hexapods: {one_line(exc)}') from exc
+                moved = tuple(self.xp.asarray(
+                    each[of].view(np.uint8) if _on_host(each)
+                    else each.reshape(count, -1)[of]) for each in structures)
             self._launch(name, moved, which[of] - begin, numbers, rows,
                          None if flags is None else flags[of])
 
@@ -150,13 +142,14 @@ class Device:
                     (motions, wrenches, bases, results))
 
 
+def _on_host(structures: Any) -> bool:
+    """Return whether structures are records of numpy: they did not fit into the GPU's memory."""
+    return structures.dtype.fields is not None
+
+
 def device_of(name: str) -> tuple[str, int]:
     """Return kind and number of a device by its name: cpu, cuda, cuda:1."""
     found = re.fullmatch(r'cpu|cuda(?::(\d+))?', name)
     if found is None:
         raise DeviceError(f'device {name!r}: must be cpu, cuda or cuda:N')
     return name[:4].rstrip(':'), int(found[1] or 0)
-
-
-def _gibibytes(size: int) -> str:
-    return f'{size / 2 ** 30:.3g} GiB'

@@ -5,15 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, wraps
+from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.core.binding import places, record
-from stewart_dynamics.errors import DeviceError, MotionError, ParameterError, ReachError
+from stewart_dynamics.errors import (
+    DeviceError, MotionError, one_line, ParameterError, ReachError)
 from stewart_dynamics.gpu.device import count_devices, Device, device_of
 from stewart_dynamics.gpu.given_arrays import leading, spread, take_array, take_mask
 from stewart_dynamics.gpu.host import Host
@@ -44,6 +45,22 @@ _POSITIONS, _RATES, _EFFORTS, _ACCELERATION, _LEVERS = (
 _SOUND: int = _PLANT['sound'] - _FIRST
 _LEGS = _SOUND + 1
 _MOTORS = 18  # angles, speeds and torques of six
+
+
+_Arguments = ParamSpec('_Arguments')
+_Result = TypeVar('_Result')
+
+
+def _in_memory(method: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+    """Return a method that raises DeviceError where memory is too small, of a GPU as well."""
+    @wraps(method)
+    def checked(*arguments: _Arguments.args, **options: _Arguments.kwargs) -> _Result:
+        try:
+            return method(*arguments, **options)
+        except MemoryError as exc:
+            raise DeviceError(f'{method.__name__}: too little memory: {one_line(exc)}') from exc
+
+    return checked
 
 
 class HexapodStates(NamedTuple):
@@ -130,7 +147,7 @@ class Hexapods:
         self.xp: Any = self._backend.xp
         self.device: str = self._backend.name
         blocks = np.repeat(np.arange(number), self.count // number)
-        self._own: Mapping[str, ArrayLike] = dict(parameters or {})
+        self._own = {name: _on_host(name, value) for name, value in (parameters or {}).items()}
         try:
             if uncertainty is not None:
                 structures = np.concatenate([
@@ -139,7 +156,7 @@ class Hexapods:
                 blocks = np.arange(self.count)
             elif self._own:
                 structures = np.concatenate([
-                    own_structures(each, {name: np.asarray(value)[blocks == n]
+                    own_structures(each, {name: value[blocks == n]
                                           for name, value in self._own.items()},
                                    self.count // number)
                     for n, each in enumerate(self._parameters)])
@@ -174,6 +191,7 @@ class Hexapods:
 
     # ---- results of motions ---------------------------------------------------------------------
 
+    @_in_memory
     def inverse_dynamics(self, motions: Any, wrench: Any = None, base: Any = None, *,
                          singular: Literal['raise', 'nan'] = 'raise', condition: bool = True,
                          ) -> InverseDynamics:
@@ -205,12 +223,13 @@ class Hexapods:
         unsolvable = results[..., CONDITION] >= UNSOLVABLE_CONDITION
         unsolvable |= ~xp.isfinite(results).all(axis=-1)
         if singular == 'nan':
-            results[...] = xp.where(unsolvable[..., None], xp.nan, results)
+            results[unsolvable] = xp.nan
         elif bool(unsolvable.any()):
             self._raise(unsolvable, shape, 'J_inv cannot be solved, a leg does not reach, or '
                         'a number is not finite')
         return InverseDynamics(self._joined(results, shape))
 
+    @_in_memory
     def forward_dynamics(self, motions: Any, efforts: Any, wrench: Any = None, base: Any = None,
                          ) -> Any:
         """
@@ -230,6 +249,7 @@ class Hexapods:
                              (motion, pushes, load, moving, found))
         return self._joined(found, shape)
 
+    @_in_memory
     def inverse_kinematics(self, poses: Any) -> Any:
         """
         Return the positions of the drives (..., 6) in poses (..., 12): lengths [m], angles [rad].
@@ -243,6 +263,7 @@ class Hexapods:
                              (rows.shape[1],), (rows, found))
         return self._joined(found, shape)
 
+    @_in_memory
     def forward_kinematics(self, positions: Any, guesses: Any) -> Any:
         """
         Return poses (..., 12) of positions of the drives (..., 6), from guesses (..., 12).
@@ -262,6 +283,7 @@ class Hexapods:
         found[...] = self.xp.where((codes != 0)[..., None], self.xp.nan, found)
         return self._joined(found, shape)
 
+    @_in_memory
     def limits(self, motions: Any, wrench: Any = None, base: Any = None) -> Any:
         """
         Return which limits each leg exceeds (..., 6), int64: bits ``STEWART_...`` in C.
@@ -331,6 +353,7 @@ class Hexapods:
             state[:, _STATE['quaternion']], state[:, _STATE['twist']], legs[:, _ACCELERATION],
             self._motors, legs[:, _SOUND] == 0.0)
 
+    @_in_memory
     def reset(self, mask: Any = None, poses: Any = None) -> HexapodStates:
         """
         Put hexapods at rest, and return all states.
@@ -380,6 +403,7 @@ class Hexapods:
                 raise ReachError(f'poses: hexapod {at}: a leg does not reach, or is not finite')
         return self.states
 
+    @_in_memory
     def step(self, commands: Any, wrench: Any = None, base: Any = None, steps: int = 1,
              ) -> HexapodStates:
         """
@@ -479,6 +503,16 @@ def _common(*shapes: tuple[int, ...]) -> tuple[tuple[int, ...], int]:
     return shape, shape[0] if shape else 1
 
 
+def _on_host(name: str, values: Any) -> Any:
+    """Return values of a parameter as an array of numpy, where they are checked."""
+    try:
+        return np.asarray(values.get() if hasattr(values, '__cuda_array_interface__') and hasattr(
+            values, 'get') else values)
+    except (TypeError, ValueError, RuntimeError) as exc:
+        raise ParameterError(f'parameters: {name}: not an array in the memory of the host: '
+                             f'{one_line(exc)}') from exc
+
+
 def _parameters_of(platform: Any) -> Parameters:
     parameters = platform.parameters if isinstance(platform, StewartPlatform) else platform
     if not isinstance(parameters, Parameters):
@@ -518,6 +552,7 @@ def _quaternions(xp: Any, rotations: Any) -> Any:
         products[:, i, j] = products[:, j, i] = r[:, i, j] + r[:, j, i]
         products[:, i, 3] = products[:, 3, i] = r[:, k, j] - r[:, j, k]
     products[:, 3, 3] = 1.0 + trace
-    largest = products[:, range(4), range(4)].argmax(axis=1)
+    each = xp.arange(4)
+    largest = products[:, each, each].argmax(axis=1)
     found = products[xp.arange(len(r)), largest]
     return found / xp.sqrt((found ** 2).sum(axis=1, keepdims=True))

@@ -66,6 +66,10 @@ class Host:
             chosen = slice(None) if len(structures) == 1 else np.flatnonzero(which == number)
             rows, loads, moving = (
                 _rows(array[chosen]) for array in (motions, wrenches, bases))
+            if len(structures) == 1:
+                batch.solve(structure, rows, loads, moving, conditioned,
+                            results.reshape(-1, results.shape[-1]))
+                return
             results[chosen] = batch.solve(structure, rows, loads, moving, conditioned).reshape(
                 results[chosen].shape)
 

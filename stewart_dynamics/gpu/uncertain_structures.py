@@ -7,8 +7,8 @@ Hexapods that a parameter file admits: drawn from normal distributions by ``unce
 Mass, center of mass and inertia of the platform, without the payload; masses, centers of mass and
 inertias of the parts of the legs, of all legs together and of each; reflected masses or inertias
 of the drives; the direction of gravity. The deviations are those of the prior of
-``stewart_identify`` (``estimation.uncertainty``), to first order. A hexapod that breaks a rule of the file, as a
-negative mass does, is drawn again.
+``stewart_identify`` (``estimation.uncertainty``), to first order. A hexapod that breaks a rule of
+the file, as a negative mass does, is drawn again.
 """
 
 from __future__ import annotations

@@ -54,7 +54,8 @@ def loaded(motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
 
 
 def solve(hexapod: Records, motions: Array, wrenches: Array | None = None,
-          bases: Array | None = None, condition: bool = True) -> Array:
+          bases: Array | None = None, condition: bool = True, results: Array | None = None,
+          ) -> Array:
     """
     Return the rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
 
@@ -65,11 +66,13 @@ def solve(hexapod: Records, motions: Array, wrenches: Array | None = None,
     bases (N, BASE) or (1, BASE): rows of the base's motion, one row for all; without them it is
         still.
     condition: whether the condition number, half of the work, is computed; else it is zero.
+    results (N, RESULT): where they are written; by default a new array.
     """
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     bases = _NO_BASE if bases is None else compact(bases)
-    results = np.empty((len(motions), WIDTHS[hexapod['leg_kind'].item()]))
+    if results is None:
+        results = np.empty((len(motions), WIDTHS[hexapod['leg_kind'].item()]))
     in_parts(_solve, (hexapod, condition), motions, wrenches, bases, results)
     return results
 
