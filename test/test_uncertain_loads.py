@@ -14,10 +14,14 @@ import numpy as np
 import pytest
 from referees import ROOT
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
+from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
+from stewart_dynamics.datasheet.uncertain_payload import uncertain_payload
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
 from stewart_dynamics.gpu import Hexapods
-from stewart_dynamics.gpu.uncertain_structures import uncertain_structures
+from stewart_dynamics.gpu.uncertain_structures import (
+    uncertain_parameters, uncertain_structures)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters
+from stewart_dynamics.mechanics.hexapod_structure import limited_structure
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.replay.uncertain_loads import UncertainLoads
@@ -90,6 +94,40 @@ def test_deviations_that_no_hexapod_keeps() -> None:
                                                  'uncertainty.leg_mass': 1e9})
     with pytest.raises(ParameterError, match='uncertainty'):
         uncertain_structures(p, 4)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_parameters_are_those_of_the_structures(kind: str) -> None:
+    p = Parameters.from_yaml(ROOT / 'config' / (
+        'platform.yaml' if kind == 'telescopic' else 'crank_platform.yaml'))
+    for each, one in zip(uncertain_parameters(p, 10, 3), uncertain_structures(p, 10, 3),
+                         strict=True):
+        other = limited_structure(each)
+        for name in ('mass', 'center_of_mass', 'inertia', 'gravity'):
+            assert np.array_equal(other[name], one[name])
+        for name in other['legs'].dtype.names:
+            assert np.array_equal(other['legs'][name], one['legs'][name], equal_nan=True), name
+
+
+def test_a_heavier_platform_carries_less() -> None:
+    """Where the center of mass is at the pivot, platform and payload are one mass for all."""
+    p = Parameters.from_yaml(PLATFORM).replaced({
+        **dict.fromkeys(SMALL, 0.0), 'uncertainty.platform_mass': 0.1,
+        'platform.center_of_mass': [0.0, 0.0, 0.0]})
+    hexapod = RatedHexapod(p)
+    found = uncertain_payload(hexapod, 40)['payload']
+    alone = float(hexapod.loads.payload(hexapod.pose, np.zeros(3)).value)
+    masses = [each.platform.mass - p.platform.mass for each in uncertain_parameters(p, 40)]
+    high, middle, low = np.percentile(masses, [2.5, 50.0, 97.5])
+    np.testing.assert_allclose(
+        [found['low'], found['median'], found['high']],
+        [alone - low, alone - middle, alone - high], rtol=1e-9)
+    weak = RatedHexapod(p.replaced({'limits.force_max': 350.0}))
+    expected = float(weak.loads.payload(weak.pose, np.zeros(3)).value)
+    assert 0.0 <= expected < 20.0
+    overloaded = uncertain_payload(weak, 40)['overloaded']
+    assert overloaded == sum(each >= expected for each in masses)
+    assert 0 < overloaded < 40
 
 
 @pytest.mark.parametrize('kind', KINDS)

@@ -77,12 +77,16 @@ def fields_of(parameters: Parameters) -> dict[str, tuple[bool, str]]:
         name: (False, field) for field, name in PLATFORM_FIELDS.items()}
 
 
-def copies(parameters: Parameters, count: int) -> tuple[Any, Array]:
-    """Return structures (count,) without payload, before what follows is set, and the payload."""
+def copies(parameters: Parameters, count: int, *, follows: bool = True) -> tuple[Any, Array]:
+    """
+    Return structures (count,) without payload, and the payload.
+
+    follows: numbers that follow from others, and are not given, are not set.
+    """
     one: Any = limited_structure(parameters).copy()
     one['mass'], one['center_of_mass'], one['inertia'] = parameters.platform.body
     for name, (of_leg, field) in fields_of(parameters).items():
-        if name not in parameters.given:
+        if follows and name not in parameters.given:
             trial = one.copy()
             (trial['legs'] if of_leg else trial)[field] = not_set(name)
             function('stewart_complete')(trial)

@@ -13,6 +13,7 @@ the file, as a negative mass does, is drawn again.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -32,13 +33,20 @@ def uncertain_structures(parameters: Parameters, count: int, seed: int = 0) -> R
 
     Raises ParameterError if the deviations admit nearly none that keeps the rules.
     """
+    structures = _drawn(parameters, count, seed)
+    complete(structures, copies(parameters, 1, follows=False)[1])
+    return structures  # type: ignore[no-any-return]
+
+
+def _drawn(parameters: Parameters, count: int, seed: int) -> Any:
+    """Return structures (count,) without the payload, that keep the rules with it."""
     random = np.random.default_rng(seed)
     found: list[Any] = []
     missing = count
     for _ in range(_MOST_ROUNDS):
-        structures, payload = copies(parameters, max(missing, 64))
+        structures, payload = copies(parameters, max(missing, 64), follows=False)
         _vary(parameters, structures, random)
-        codes, _ = complete(structures, payload)
+        codes, _ = complete(structures.copy(), payload)
         found.append(structures[codes == 0][:missing])
         missing -= len(found[-1])
         if not missing:
@@ -70,3 +78,23 @@ def _vary(parameters: Parameters, structures: Any, random: np.random.Generator) 
     tilts[:, :2] = deviations.tilt * normal((count, 2))
     structures['gravity'] = (
         from_rotation_vector(tilts) @ structures['gravity'][..., None])[..., 0]
+
+
+def uncertain_parameters(parameters: Parameters, count: int, seed: int = 0,
+                         ) -> Iterator[Parameters]:
+    """Yield the parameters of the same hexapods, for what is computed of one at a time."""
+    kind = parameters.leg_kind
+    names = {f'{part}_{what}': f'legs.{part}.{what}' for part in kind.parts
+             for what in ('mass', 'center_of_mass', 'inertia')}
+    reflected = kind.fields['reflected_mass']
+    if reflected in parameters.given:
+        names['reflected_mass'] = reflected
+    else:
+        names |= {each: f'drive.{each}' for each in ('motor_inertia', 'screw_inertia')
+                  if parameters[f'drive.{each}'] is not None}
+    for structure in _drawn(parameters, count, seed):
+        yield parameters.replaced({
+            'platform.mass': structure['mass'], 'platform.inertia': structure['inertia'],
+            'platform.center_of_mass': structure['center_of_mass'],
+            'gravity': structure['gravity'],
+            **{name: structure['legs'][field] for field, name in names.items()}})

@@ -605,7 +605,7 @@ class CueingGroup(ParameterGroup):
 
 def _deviation(text: str, unit: str, default: float | None) -> Any:
     return declare(f'standard deviation of {text}; a prior of stewart_identify and '
-                   '~/identify_payload, drawn by stewart_replay --uncertainty', unit, default,
+                   '~/identify_payload, drawn by --uncertainty of programs', unit, default,
                    minimum=0.0)
 
 
