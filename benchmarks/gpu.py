@@ -36,7 +36,7 @@ STEP = 5e-4  # of the engines [s]
 
 
 class Row(NamedTuple):
-    """A figure: what is done, how many, how often a second, and the target."""
+    """A figure: the work, its device, how many are done a second, and the target."""
 
     what: str
     device: str

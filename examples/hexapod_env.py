@@ -23,7 +23,7 @@ from stewart_dynamics import Motion, StewartError, StewartPlatform
 from stewart_dynamics.gpu import Hexapods
 
 TASKS = 'hold', 'follow', 'push'
-# Of the motions to follow: largest amplitude [m, rad] and frequency [Hz], of X Y Z and yaw.
+# Largest amplitudes [m, rad] and range of frequencies [Hz] of the motions, along X Y Z and yaw.
 AMPLITUDE, FREQUENCY = np.array([0.03, 0.03, 0.02, 0.05]), (0.5, 2.0)
 PUSH, PUSH_BEGIN, PUSH_TIME = 0.3, 0.2, 0.5  # by the weight; [s]
 

@@ -293,6 +293,10 @@ BAD: dict[str, Callable[[Hexapods, Array], object]] = {
     'steps': lambda h, m: h.step(np.zeros(6), steps=-1),
     'mask': lambda h, m: h.reset(np.zeros(3)),
     'nan in a motion': lambda h, m: h.inverse_dynamics(np.full(24, np.nan)),
+    'positions of no pose': lambda h, m: h.forward_kinematics(
+        np.full(6, 1e-3), PLATFORM.home_pose().rows),
+    'accelerations': lambda h, m: h.forward_dynamics(np.full(24, np.nan), np.zeros(6)),
+    'positions': lambda h, m: h.inverse_kinematics(np.full(12, np.nan)),
     'unreachable': lambda h, m: h.inverse_dynamics(np.zeros(24)),
     'count': lambda h, m: Hexapods([PLATFORM, PLATFORM], 3, device='cpu'),
     'no platform': lambda h, m: Hexapods(Path('platform.yaml'), 3, device='cpu'),  # type: ignore

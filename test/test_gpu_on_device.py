@@ -26,7 +26,7 @@ cupy: Any = pytest.importorskip('cupy')
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_million_motions_have_the_bits_of_the_cpu(kind: str) -> None:
-    """Of 100 random hexapods, 10^4 motions each, some of them out of reach."""
+    """100 random hexapods with 10^4 motions each, some of them out of reach."""
     machines = [random_hexapod(kind, seed, 50) for seed in range(100)]
     random = rng(1)
     motions = np.stack([motion.rows for _, motion in machines], axis=1)  # sample, hexapod
@@ -40,9 +40,10 @@ def test_a_million_motions_have_the_bits_of_the_cpu(kind: str) -> None:
         given = xp.asarray(motions), xp.asarray(wrench)
         found = hexapods.inverse_dynamics(*given, singular='nan')
         efforts = getattr(found, machines[0][0].leg_kind.effort.field)
-        accelerations = hexapods.forward_dynamics(given[0], efforts, given[1])
-        positions = hexapods.inverse_kinematics(given[0][..., :12])
-        poses = hexapods.forward_kinematics(positions, given[0][..., :12])
+        accelerations = hexapods.forward_dynamics(
+            given[0], efforts, given[1], singular='nan')
+        positions = hexapods.inverse_kinematics(given[0][..., :12], singular='nan')
+        poses = hexapods.forward_kinematics(positions, given[0][..., :12], singular='nan')
         results.append([hexapods.to_host(each) for each in (
             found.rows, accelerations, positions, poses)])
     for one, other in zip(results[0][:3], results[1][:3], strict=True):

@@ -38,7 +38,7 @@ def cuda_source() -> str:
 
 
 def _written_out(name: str) -> str:
-    """Return a file of ``core/`` with what it includes in place of the includes."""
+    """Return a file of ``core/`` with the included files in place of the includes."""
     return re.sub(r'^#include ("(?P<own>[\w.]+)"|<.*>).*$',
                   lambda found: _written_out(found['own']) if found['own'] else '',
                   header(name), flags=re.MULTILINE)

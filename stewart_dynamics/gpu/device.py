@@ -21,7 +21,7 @@ _SHARE = 0.8  # of the free memory, for structures
 
 
 def _cupy() -> Any:
-    """Return the module; DeviceError says what is missing."""
+    """Return the module; DeviceError names a missing package."""
     try:
         import cupy
     except ImportError as exc:
@@ -31,7 +31,7 @@ def _cupy() -> Any:
 
 
 def count_devices() -> int:
-    """Return how many GPUs there are; DeviceError says why there is none."""
+    """Return the number of GPUs; DeviceError gives the reason if it is zero."""
     cupy = _cupy()
     try:
         count = int(cupy.cuda.runtime.getDeviceCount())

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.core.binding import places, record
 from stewart_dynamics.errors import (
-    DeviceError, MotionError, one_line, ParameterError, ReachError)
+    DeviceError, MotionError, one_line, ParameterError, PoseError, ReachError, StewartError)
 from stewart_dynamics.gpu.device import count_devices, Device, device_of
 from stewart_dynamics.gpu.given_arrays import leading, spread, take_array, take_mask
 from stewart_dynamics.gpu.host import Host
@@ -44,6 +44,7 @@ _POSITIONS, _RATES, _EFFORTS, _ACCELERATION, _LEVERS = (
     for name in ('positions', 'rates', 'efforts', 'acceleration', 'lever_ratios'))
 _SOUND: int = _PLANT['sound'] - _FIRST
 _LEGS = _SOUND + 1
+UNREACHED = 'a leg does not reach, or a number is not finite'
 _MOTORS = 18  # angles, speeds and torques of six
 
 
@@ -96,7 +97,7 @@ class Hexapods:
     Parameters
     ----------
     platforms : StewartPlatform, Parameters, or a sequence of them
-        Of several, each stands for the same number of hexapods, one block after the other.
+        Each of several stands for the same number of hexapods, one block after the other.
     count : int, optional
         Number of hexapods N, a multiple of the number of platforms; by default that number.
     parameters : mapping of names to arrays (N,) or (N, n), optional
@@ -225,18 +226,17 @@ class Hexapods:
         if singular == 'nan':
             results[unsolvable] = xp.nan
         elif bool(unsolvable.any()):
-            self._raise(unsolvable, shape, 'J_inv cannot be solved, a leg does not reach, or '
-                        'a number is not finite')
+            self._raise(unsolvable, shape, f'J_inv cannot be solved, {UNREACHED}')
         return InverseDynamics(self._joined(results, shape))
 
     @_in_memory
     def forward_dynamics(self, motions: Any, efforts: Any, wrench: Any = None, base: Any = None,
-                         ) -> Any:
+                         *, singular: Literal['raise', 'nan'] = 'raise') -> Any:
         """
         Return accelerations, linear and angular (..., 6), under efforts of the drives (..., 6).
 
         See ``StewartPlatform.forward_dynamics``; the accelerations in ``motions`` are ignored.
-        Where a rod does not reach they are nan.
+        Raises ReachError, or with singular='nan' they are nan, where a rod does not reach.
         """
         motion, load, moving, shape = self._loaded(motions, wrench, base)
         pushes, of_efforts = self._taken('efforts', efforts, 6)
@@ -247,28 +247,31 @@ class Hexapods:
         found = self._backend.empty((self.count, samples, 6))
         self._backend.launch('hexapods_accelerate', (self._platforms,), self._which, (samples,),
                              (motion, pushes, load, moving, found))
-        return self._joined(found, shape)
+        return self._known(found, shape, singular, UNREACHED)
 
     @_in_memory
-    def inverse_kinematics(self, poses: Any) -> Any:
+    def inverse_kinematics(self, poses: Any, *, singular: Literal['raise', 'nan'] = 'raise',
+                           ) -> Any:
         """
         Return the positions of the drives (..., 6) in poses (..., 12): lengths [m], angles [rad].
 
-        Poses are ``Pose.rows``, of motions the first 12 numbers. Where a rod does not reach they
-        are nan.
+        Poses are ``Pose.rows``, of motions the first 12 numbers. Raises ReachError, or with
+        singular='nan' they are nan, where a rod does not reach.
         """
         rows, shape = self._taken('poses', poses, POSE.stop)
         found = self._backend.empty((self.count, rows.shape[1], 6))
         self._backend.launch('hexapods_positions', (self._platforms,), self._which,
                              (rows.shape[1],), (rows, found))
-        return self._joined(found, shape)
+        return self._known(found, shape, singular, UNREACHED)
 
     @_in_memory
-    def forward_kinematics(self, positions: Any, guesses: Any) -> Any:
+    def forward_kinematics(self, positions: Any, guesses: Any, *,
+                           singular: Literal['raise', 'nan'] = 'raise') -> Any:
         """
         Return poses (..., 12) of positions of the drives (..., 6), from guesses (..., 12).
 
-        See ``StewartPlatform.forward_kinematics``; nan where none was found.
+        See ``StewartPlatform.forward_kinematics``. Raises PoseError, or with singular='nan' they
+        are nan, where it did not converge.
         """
         wanted, shape = self._taken('positions', positions, 6)
         rows, of_guesses = self._taken('guesses', guesses, POSE.stop)
@@ -280,16 +283,16 @@ class Hexapods:
         codes = self.xp.empty((self.count, samples), dtype=np.int64)
         self._backend.launch('hexapods_poses', (self._platforms,), self._which, (samples,),
                              (wanted, found, codes))
-        found[...] = self.xp.where((codes != 0)[..., None], self.xp.nan, found)
-        return self._joined(found, shape)
+        found[codes != 0] = self.xp.nan
+        return self._known(found, shape, singular, 'did not converge from the guess', PoseError)
 
     @_in_memory
     def limits(self, motions: Any, wrench: Any = None, base: Any = None) -> Any:
         """
         Return which limits each leg exceeds (..., 6), int64: bits ``STEWART_...`` in C.
 
-        Of poses, twists, loads and motors; those that depend on earlier motions are not among
-        them. -1: numbers overflow, or a leg does not reach.
+        Limits of poses, twists, loads and motors, without those that depend on earlier motions.
+        -1: numbers overflow, or a leg does not reach.
         """
         motion, load, moving, shape = self._loaded(motions, wrench, base)
         found = self.xp.empty((*motion.shape[:2], 6), dtype=np.int64)
@@ -488,10 +491,20 @@ class Hexapods:
         """Return results (N, S, width) as (N, width) or (S, N, width)."""
         return rows.transpose(1, 0, 2) if shape else rows[:, 0]
 
-    def _raise(self, wrong: Any, shape: tuple[int, ...], words: str) -> None:
+    def _known(self, found: Any, shape: tuple[int, ...], singular: str, words: str,
+               kind: type[StewartError] = ReachError) -> Any:
+        """Return results (N, S, width) as (N, width) or (S, N, width), all of them finite."""
+        if singular == 'raise':
+            wrong = ~self.xp.isfinite(found).all(axis=-1)
+            if bool(wrong.any()):
+                self._raise(wrong, shape, words, kind)
+        return self._joined(found, shape)
+
+    def _raise(self, wrong: Any, shape: tuple[int, ...], words: str,
+               kind: type[StewartError] = ReachError) -> None:
         hexapod, sample = (int(each[0]) for each in self.xp.nonzero(wrong))
         of_sample = f', sample {sample}' if shape else ''
-        raise ReachError(f'hexapod {hexapod}{of_sample}: {words}')
+        raise kind(f'hexapod {hexapod}{of_sample}: {words}')
 
 
 def _common(*shapes: tuple[int, ...]) -> tuple[tuple[int, ...], int]:

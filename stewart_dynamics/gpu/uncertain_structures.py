@@ -82,7 +82,7 @@ def _vary(parameters: Parameters, structures: Any, random: np.random.Generator) 
 
 def uncertain_parameters(parameters: Parameters, count: int, seed: int = 0,
                          ) -> Iterator[Parameters]:
-    """Yield the parameters of the same hexapods, for what is computed of one at a time."""
+    """Yield the parameters of the same hexapods, one at a time."""
     kind = parameters.leg_kind
     names = {f'{part}_{what}': f'legs.{part}.{what}' for part in kind.parts
              for what in ('mass', 'center_of_mass', 'inertia')}
