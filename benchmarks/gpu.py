@@ -89,6 +89,35 @@ def inverse_dynamics(name: str, legs: str, count: int, rounds: int) -> Iterator[
                       target if legs == 'telescopic' and layout != 'rows' else 0.0)
 
 
+def equal_bits(name: str, legs: str, count: int) -> str:
+    """
+    Compare the kernels with the lanes of the library, over motions of 100 random hexapods.
+
+    Few samples of a hexapod in a call take the loops of the kernels on a CPU, too.
+    """
+    of, random = StewartPlatform.from_yaml(ROOT / 'config' / FILES[legs]), np.random.default_rng(2)
+    p, shape = of.parameters, (100, 6, 3)
+    size = p.singularity.characteristic_length
+    own = {'platform.mass': p.platform.mass * random.uniform(0.5, 2.0, 100), **{
+        each: p[each] + 0.01 * size * random.normal(size=shape)
+        for each in ('geometry.base_joints', 'geometry.platform_joints')}}
+    known, found = Hexapods(of, 100, own, device='cpu'), Hexapods(of, 100, own, device=name)
+    rows = motions_of(of, count).reshape(-1, 100, 24)
+    wrench = 0.1 * p.platform.mass * random.normal(size=(len(rows), 100, 6))
+    results = known.inverse_dynamics(rows, wrench, singular='nan').rows
+    part = 4 if name == 'cpu' else len(rows)
+    equal = 0
+    for begin in range(0, len(rows), part):
+        of_part = slice(begin, begin + part)
+        others = found.to_host(found.inverse_dynamics(
+            *(found.xp.asarray(each[of_part]) for each in (rows, wrench)), singular='nan').rows)
+        equal += int(((others == results[of_part]) | np.isnan(others) & np.isnan(
+            results[of_part])).all(axis=-1).sum())
+    return (f'{legs} legs: all bits of {equal:,} of {rows.shape[0] * 100:,} motions of 100 random '
+            f'hexapods are those of the lanes ({found.device}), '
+            f'{np.isfinite(results).all(axis=-1).mean():.1%} of them within reach.')
+
+
 def steps(name: str, legs: str, count: int, number: int, rounds: int, own: bool) -> Row:
     """Measure the steps of the simulator."""
     of = StewartPlatform.from_yaml(ROOT / 'config' / FILES[legs])
@@ -213,7 +242,7 @@ def processor() -> str:
 
 
 def measured(gpu: bool, small: bool, rounds: int) -> tuple[list[Row], list[str]]:
-    """Return all figures, and the reasons for those that are missing."""
+    """Return all figures; then which bits are equal, and the reasons for missing figures."""
     rows: list[Row] = []
     device, lanes = ('cuda' if gpu else 'cpu'), 2 ** 14 if small else 2 ** 20
     for legs in FILES:
@@ -227,8 +256,9 @@ def measured(gpu: bool, small: bool, rounds: int) -> tuple[list[Row], list[str]]
         rows += inverse_dynamics('cpu', 'telescopic', lanes, 3)
         rows.append(steps('cpu', 'telescopic', 4096, 100, 1, False))
     found = list(engines(gpu, small))
+    bits = [equal_bits(device, legs, 10_000 if small else 1_000_000) for legs in FILES]
     return ([*rows, *(each for each in found if isinstance(each, Row))],
-            [each for each in found if isinstance(each, str)])
+            [*bits, *(each for each in found if isinstance(each, str))])
 
 
 def main() -> None:
