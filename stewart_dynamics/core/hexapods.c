@@ -8,7 +8,7 @@
 
 #ifdef __CUDACC_RTC__
 #include "stewart_dynamics.c"
-#define STEWART_KERNEL __global__
+#define STEWART_KERNEL extern "C" __global__
 #include "library.h"
 #define FLAT __noinline__  /* functions of many lines, called from several places: inlined, they
                                take minutes to compile */

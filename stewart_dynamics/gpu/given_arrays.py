@@ -56,7 +56,7 @@ def take_mask(xp: Any, name: str, value: Any, count: int, device: str) -> Any:
     if array.dtype != bool or array.shape != (count,):
         raise MotionError(f'{name}: shape {tuple(array.shape)} of {array.dtype}: must be '
                           f'({count},) of bool')
-    return array
+    return xp.ascontiguousarray(array)
 
 
 def spread(xp: Any, name: str, array: Any, hexapods: int, samples: int, width: int) -> Any:
