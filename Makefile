@@ -5,9 +5,9 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
-  bench-replay bench-response clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship docs docs-site export-demo installed \
-  lint lint-flake8 lint-layers lint-mypy lint-pep257 lint-ruff test tools wheels
+.PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-gpu bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
+  bench-replay bench-response clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship demo-tune docs docs-site export-demo installed \
+  lint lint-flake8 lint-layers lint-mypy lint-pep257 lint-ruff test test-gpu tools wheels
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -87,6 +87,11 @@ TOOLS := $(VENV)/tools-$(ROS)
 test: $(if $(VERSIONS),$(TOOLS),lint)
 	$(VENV)/bin/python -m pytest --numprocesses $(TESTERS) --dist loadfile --no-loadscope-reorder
 
+# On a computer with a GPU; CuPy is of no use to the others. The figures: make bench-gpu.
+test-gpu: $(TOOLS)
+	@$(VENV)/bin/python -c 'import cupy' 2> /dev/null || $(PIP) install --requirement requirements-gpu.txt
+	$(VENV)/bin/python -m pytest test/test_gpu_on_device.py test/test_gpu.py test/test_hexapod_env.py
+
 # Beside one another: mypy and flake8 take nearly the same time.
 lint: $(TOOLS)
 	@$(MAKE) --no-print-directory --jobs --output-sync lint-mypy lint-flake8 lint-pep257 lint-ruff lint-layers
@@ -125,6 +130,10 @@ demo-mujoco: $(INSTALLED)
 demo-ship: $(INSTALLED)
 	@$(VENV)/bin/python demo/ship.py
 
+# Gymnasium is one of the tools.
+demo-tune: $(TOOLS)
+	@$(VENV)/bin/python demo/tune.py
+
 demo-calibrate: $(INSTALLED)
 	@$(VENV)/bin/python demo/calibrate.py
 
@@ -142,6 +151,10 @@ bench-capability: $(TOOLS)
 
 bench-export: $(TOOLS)
 	$(VENV)/bin/python benchmarks/exported_source.py --write
+
+bench-gpu: $(TOOLS)
+	@$(VENV)/bin/python -c 'import cupy' 2> /dev/null || $(PIP) install --requirement requirements-gpu.txt
+	$(VENV)/bin/python benchmarks/gpu.py --write
 
 bench-loop: $(TOOLS)
 	$(VENV)/bin/python benchmarks/simulator.py --write

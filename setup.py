@@ -53,6 +53,8 @@ extras_require = {
         'numpydoc>=1.6',
         'sphinx>=7.3.7',  # for this docutils; 7.3.0 warns of any type of a setting
     ],
+    'gpu': ['cupy-cuda12x>=13'],
+    'gym': ['gymnasium>=1.1'],  # for examples/hexapod_env.py
     'live': ['websockets>=13'],  # for examples/live_view.py
     'mujoco': ['mujoco>=3.14'],  # before, inertias have errors of 1e-5
     'parquet': ['pyarrow>=14'],
@@ -83,6 +85,7 @@ extras_require = {
         'mcap-ros2-support',
         'mujoco',
         'mypy',
+        'nvidia-cuda-nvrtc-cu12; sys_platform == "linux"',  # compiles kernels without a GPU
         'packaging',
         'pin',
         'playwright',

@@ -118,21 +118,24 @@ class Loop:
             'stewart_trajectory': {'use_sim_time': True, **trajectory}}
 
     def run(self, feed_forward: bool, payload: float, progress: Callable[[int], object],
-            simulator: Sequence[str | Path] = ()) -> Run:
+            simulator: Sequence[str | Path] = (),
+            gains: Mapping[str, float] | None = None) -> Run:
         """
         Run the four programs, report the simulated time [ns], and return the errors.
 
-        A command ``simulator`` takes the place of stewart_simulator, with its topics.
+        A command ``simulator`` takes the place of stewart_simulator, with its topics; gains take
+        the place of those of the bandwidth.
         """
         mass, inertia = self._payload
         simulated = {
             'platform.mass': payload * mass, 'platform.inertia': (payload * inertia).tolist()}
         return Run(feed_forward, payload, self.errors(
-            feed_forward, simulated, progress, Recorder(), simulator=simulator))
+            feed_forward, simulated, progress, Recorder(), simulator=simulator, gains=gains))
 
     def errors(self, feed_forward: bool, simulated: Mapping[str, Any],
                progress: Callable[[int], object], recorder: Recorder,
-               hexapod: Path | None = None, simulator: Sequence[str | Path] = ()) -> Errors:
+               hexapod: Path | None = None, simulator: Sequence[str | Path] = (),
+               gains: Mapping[str, float] | None = None) -> Errors:
         """
         Run the four programs and return the errors.
 
@@ -150,10 +153,13 @@ class Loop:
             Another parameter file for the node.
         simulator : sequence of str, optional
             A command to be run instead of stewart_simulator, with the same topics.
+        gains : mapping, optional
+            ``proportional_gain`` and ``derivative_gain`` in place of those of the bandwidth.
 
         """
         given = {name: {'ros__parameters': dict(values)} for name, values in self._given.items()}
-        given['leg_controller']['ros__parameters']['feed_forward'] = feed_forward
+        given['leg_controller']['ros__parameters'].update(
+            {**(gains or {}), 'feed_forward': feed_forward})
         given['stewart_simulator']['ros__parameters'].update(simulated)
         files = self._files | ({'stewart_dynamics': [hexapod]} if hexapod else {})
         programs = {**PROGRAMS, 'stewart_simulator': simulator} if simulator else PROGRAMS

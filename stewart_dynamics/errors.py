@@ -67,5 +67,9 @@ class ReachError(SingularityError):
     """A pose that a rod does not reach: names the leg and the missing distance."""
 
 
+class DeviceError(StewartError, RuntimeError):
+    """A GPU that cannot be used: no CuPy, no driver, no device, too little memory."""
+
+
 class BagError(StewartError):
     """A bag that cannot be read or written."""

@@ -1,8 +1,41 @@
 /* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * Forward dynamics, base wrench, regressor, external wrench.
+ * One sample; forward dynamics, base wrench, regressor, external wrench.
  */
+
+/* ---- one sample ------------------------------------------------------------------------------ */
+
+/* Whether a base adds a load: one of nan adds none. */
+static int moves(const stewart_base * base) {return base->gravity[0] == base->gravity[0];}
+
+static load load_of(const double wrench[6]) {
+  load external = {read3(wrench), read3(wrench + 3)};
+  return external;
+}
+
+/* Write the result of one sample, unchecked; see solve. */
+FLAT static void solve_sample(
+  const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
+  const stewart_base * base, int conditioned, stewart_result * result) {
+  load external = load_of(wrench);
+  moving_base moving;
+  if (moves(base)) {
+    moving = base_of(platform, base);
+    load carried = carry(platform, motion, &moving);
+    external.force = subtract(external.force, carried.force);
+    external.moment = subtract(external.moment, carried.moment);
+  }
+  clear_result(result);
+  solve(platform, motion, external, moves(base) ? &moving : NULL, conditioned, result);
+}
+
+int64_t solve_one(const stewart_platform * platform, one_motion * sample) {
+  const stewart_result * result = &sample->result;
+  solve_sample(platform, &sample->motion, sample->wrench, &sample->base, 1,
+               &sample->result);
+  return all_finite(result, sizeof *result) && result->condition_number < UNSOLVABLE_CONDITION;
+}
 
 /* ---- forward dynamics ----------------------------------------------------------------------- */
 
@@ -297,7 +330,7 @@ static void add_end(
   const stewart_platform * platform, one_measurement * m, const stewart_motion * motion,
   const stewart_base * base) {
   stewart_result result;
-  solve_sample(platform, motion, m->known, base, &result);
+  solve_sample(platform, motion, m->known, base, 1, &result);
   const double * model = efforts_of(platform, &result);
   add_external_wrench(
     platform, motion->position, motion->rotation, model, m->forces, 0.5, m->after);

@@ -20,6 +20,8 @@
 /* A function into which all that it calls is inlined: twice as fast. */
 #define FLAT __attribute__((flatten))
 
+#define ONCE  /* a function that is not inlined on a GPU */
+
 int64_t processor_kind(void) {
 #if defined(__x86_64__) || defined(_M_X64)
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) {return 2;}
@@ -48,36 +50,6 @@ void solve_many(
                 width, width);
 }
 
-/* Whether a base adds a load: one of nan adds none. */
-static int moves(const stewart_base * base) {return base->gravity[0] == base->gravity[0];}
-
-static load load_of(const double wrench[6]) {
-  load external = {read3(wrench), read3(wrench + 3)};
-  return external;
-}
-
-/* Write the result of one sample, unchecked. */
-FLAT static void solve_sample(
-  const stewart_platform * platform, const stewart_motion * motion, const double wrench[6],
-  const stewart_base * base, stewart_result * result) {
-  load external = load_of(wrench);
-  moving_base moving;
-  if (moves(base)) {
-    moving = base_of(platform, base);
-    load carried = carry(platform, motion, &moving);
-    external.force = subtract(external.force, carried.force);
-    external.moment = subtract(external.moment, carried.moment);
-  }
-  clear_result(result);
-  solve(platform, motion, external, moves(base) ? &moving : NULL, 1, result);
-}
-
-int64_t solve_one(const stewart_platform * platform, one_motion * sample) {
-  const stewart_result * result = &sample->result;
-  solve_sample(platform, &sample->motion, sample->wrench, &sample->base, &sample->result);
-  return all_finite(result, sizeof *result) && result->condition_number < UNSOLVABLE_CONDITION;
-}
-
 /* Write the results of motions without load on a base at rest, without condition numbers. */
 static void solve_unloaded(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,
@@ -101,3 +73,4 @@ static void solve_unloaded(
 #include "governor.c"
 #include "cueing.c"
 #include "records.c"
+#include "hexapods.c"

@@ -81,6 +81,9 @@ typedef struct {
   stewart_motors motors;
 } one_plant;
 
+/* What of that is the same in all periods of a hexapod. */
+typedef struct { double by_torques; end_stops stops; double effort_max[6]; } plant_constants;
+
 /* Washout filters; surge sway heave, or roll pitch yaw: see cueing/motion_cueing.py. */
 typedef struct {
   double translation_gain[3], translation_frequency[3], translation_damping[3];
@@ -270,5 +273,73 @@ void plant_advance(const stewart_platform * platform, one_plant * plant);
 void scan_records(
   int64_t size, const uint8_t * data, const int64_t * numbers, int64_t room, int64_t * found,
   int64_t * totals);
+
+/* Many hexapods: hexapod h has platforms[which[h]]. The strides of an array follow it, in numbers:
+   from hexapod to hexapod, from sample to sample, and between the numbers of a sample; 0: one for
+   all. A base of nan is still. Each is a kernel where NVRTC compiles hexapods.c. */
+#ifndef STEWART_KERNEL
+#define STEWART_KERNEL
+#endif
+
+/* Inverse dynamics: see solve_many. */
+STEWART_KERNEL void hexapods_solve(
+  const stewart_platform * platforms, const int64_t * which, int64_t hexapods, int64_t samples,
+  int64_t conditioned, int64_t width,
+  const double * motions, int64_t motions_h, int64_t motions_s, int64_t motions_n,
+  const double * wrenches, int64_t wrenches_h, int64_t wrenches_s, int64_t wrenches_n,
+  const double * bases, int64_t bases_h, int64_t bases_s, int64_t bases_n,
+  double * results, int64_t results_h, int64_t results_s, int64_t results_n);
+
+/* Limits that each leg (6) exceeds, bits as in stewart_output, of poses, twists, loads and motors;
+   -1: numbers overflow, or a leg does not reach. */
+STEWART_KERNEL void hexapods_limits(
+  const stewart_platform * platforms, const int64_t * which, int64_t hexapods, int64_t samples,
+  const double * motions, int64_t motions_h, int64_t motions_s, int64_t motions_n,
+  const double * wrenches, int64_t wrenches_h, int64_t wrenches_s, int64_t wrenches_n,
+  const double * bases, int64_t bases_h, int64_t bases_s, int64_t bases_n,
+  int64_t * exceeded, int64_t exceeded_h, int64_t exceeded_s, int64_t exceeded_n);
+
+/* Accelerations (6), linear and angular, under efforts of the drives. */
+STEWART_KERNEL void hexapods_accelerate(
+  const stewart_platform * platforms, const int64_t * which, int64_t hexapods, int64_t samples,
+  const double * motions, int64_t motions_h, int64_t motions_s, int64_t motions_n,
+  const double * efforts, int64_t efforts_h, int64_t efforts_s, int64_t efforts_n,
+  const double * wrenches, int64_t wrenches_h, int64_t wrenches_s, int64_t wrenches_n,
+  const double * bases, int64_t bases_h, int64_t bases_s, int64_t bases_n,
+  double * accelerations, int64_t accelerations_h, int64_t accelerations_s,
+  int64_t accelerations_n);
+
+/* Positions of the drives in poses; nan where a rod does not reach. */
+STEWART_KERNEL void hexapods_positions(
+  const stewart_platform * platforms, const int64_t * which, int64_t hexapods, int64_t samples,
+  const double * poses, int64_t poses_h, int64_t poses_s, int64_t poses_n,
+  double * positions, int64_t positions_h, int64_t positions_s, int64_t positions_n);
+
+/* Poses of positions of the drives, from the guesses that they have; codes, one for each. */
+STEWART_KERNEL void hexapods_poses(
+  const stewart_platform * platforms, const int64_t * which, int64_t hexapods, int64_t samples,
+  const double * positions, int64_t positions_h, int64_t positions_s, int64_t positions_n,
+  double * poses, int64_t poses_h, int64_t poses_s, int64_t poses_n,
+  int64_t * codes, int64_t codes_h, int64_t codes_s);
+
+/* A period of the simulated hexapods that are chosen and sound: `steps` of a length [s], under
+   constant commands, wrenches and bases. States: plant_state. Legs: the numbers of one_plant from
+   the positions on. Motors (18): angles, speeds, torques. */
+STEWART_KERNEL void hexapods_step(
+  const stewart_platform * platforms, const plant_constants * constants, const int64_t * which,
+  int64_t hexapods, double steps, double step, const uint8_t * chosen,
+  const double * commands, int64_t commands_h, int64_t commands_n,
+  const double * wrenches, int64_t wrenches_h, int64_t wrenches_n,
+  const double * bases, int64_t bases_h, int64_t bases_n,
+  double * states, int64_t states_h, int64_t states_n,
+  double * legs, int64_t legs_h, int64_t legs_n,
+  double * motors, int64_t motors_h, int64_t motors_n);
+
+/* Complete and check hexapods (count,), then add their payloads (count, 10), or one for all: mass,
+   center of mass, inertia. Codes: of the first rule that is broken; negative: of
+   stewart_add_payload. Places: see stewart_check. */
+void complete_hexapods(
+  int64_t count, stewart_platform * platforms, int64_t n_payloads, const double * payloads,
+  int64_t * codes, int64_t * places);
 
 #endif

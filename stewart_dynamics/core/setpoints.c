@@ -32,7 +32,7 @@ int64_t step_setpoints(
     const setpoint * of = &setpoints[k];
     stewart_output * to = &outputs[k];
     if (!solved) {
-      solve_sample(platform, &of->motion, of->wrench, &of->base, &to->result);
+      solve_sample(platform, &of->motion, of->wrench, &of->base, 1, &to->result);
       complete_outputs(platform, 1, of, to);
     }
     if (stamps[k] < -STAMPS_END || stamps[k] >= STAMPS_END) {to->answered = 0.0;}

@@ -20,6 +20,7 @@ from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
 from stewart_dynamics.datasheet.motion_ratings import judged, uses
 from stewart_dynamics.datasheet.pose_ratings import answer, AXES
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
+from stewart_dynamics.datasheet.uncertain_payload import uncertain_payload
 from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_euler
@@ -53,6 +54,7 @@ class Order(NamedTuple):
     recording: Options = Options()
     leg_stiffness: float | None = None
     stuck: int | None = None  # index of a leg
+    uncertainty: int = 0  # hexapods that the file admits, whose payloads are computed as well
     torque_unit: str = 'Nm'  # of the drives' torques on the page, one of TORQUES
 
 
@@ -93,6 +95,8 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     progress.stage('loads')
     sheet |= dict.fromkeys(('velocity', 'acceleration', 'force', 'moment', 'payload'))
     sheet |= ratings.at_pose(hexapod)
+    sheet['uncertainty'] = (
+        uncertain_payload(hexapod, order.uncertainty) if order.uncertainty else None)
     sheet['worst'] = None if ranges is None else ratings.worst(hexapod, ranges, _LEVELS)
     sheet['stiffness'] = None if order.leg_stiffness is None else ratings.stiffness(
         hexapod, order.leg_stiffness, ranges, _LEVELS)

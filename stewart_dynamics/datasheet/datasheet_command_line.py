@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from stewart_dynamics.program import (
-    add_node, add_parameters, add_reading, between, frequency, NODE, Program)
+    add_node, add_parameters, add_reading, between, frequency, NODE, Program, whole)
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.results_folder import DATASHEETS
 from stewart_dynamics.signals import interrupt_on_signals
@@ -53,6 +53,9 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--stuck', metavar='LEG',
                         help='name of a leg that keeps its length: the motions that remain, and '
                              'the loads they can hold')
+    parser.add_argument('--uncertainty', type=whole(2, 100_000), default=0, metavar='N',
+                        help='rate N hexapods as well that uncertainty.* of the file admits: the '
+                             'band of the payload')
     parser.add_argument('--box', type=Path, metavar='FILE',
                         help='YAML file of a claimed set of ranges, x y z [m] rx ry rz [rad] from '
                              'the pose: is all of it reachable?')
@@ -101,7 +104,7 @@ def _run(given: argparse.Namespace) -> int:
             given.payload[0], np.array(given.payload[1:])),
         None if given.box is None else read_box(given.box, parameters), given.motion, options,
         given.leg_stiffness, None if given.stuck is None else leg_of(given.stuck, parameters),
-        given.torque_unit)
+        given.uncertainty, given.torque_unit)
     check_order(order, parameters)
     check_free(given.output, options, DATASHEET)
     remove_abandoned([given.output])

@@ -19,7 +19,7 @@ from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, both_payloads, both_ways, box_verdict, DEGREE, down, limit_name, LINEAR, MM,
     motion_verdict, numbers, OF_DRIVES, payloads_in_words, possible, rated_payload,
-    setpoints_used, span, stuck_rows, TORQUES, Unit, unit_of)
+    setpoints_used, span, stuck_rows, TORQUES, uncertain_line, Unit, unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
 from stewart_dynamics.datasheet.pose_ratings import AXES, grid, Payloads, poses_of
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
@@ -136,6 +136,7 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         between_setpoints=between_setpoints(sheet['motion']) if sheet['motion'] else '',
         dashes={name: charts.DASHES[name] for name in pictures.limits()},
         payloads=payloads_in_words(sheet),
+        uncertain=uncertain_line(sheet['uncertainty']) if sheet['uncertainty'] else '',
         stuck=stuck_rows(sheet['stuck_leg']) if sheet['stuck_leg'] else None,
         limit_name=limit_name, possible=possible, setpoints_used=setpoints_used, down=down,
         span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)

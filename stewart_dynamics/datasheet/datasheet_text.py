@@ -118,6 +118,8 @@ def sheet_text(sheet: dict[str, Any]) -> str:
             limit = f', by {_limit(payload)}' if payload['limit'] and not any_orientation else ''
             lines.append(f'payload at the pivot, at rest{kind and f", {kind}"}{any_orientation}: '
                          f'{down(value)} kg{limit}')
+    if sheet['uncertainty']:
+        lines.append(uncertain_line(sheet['uncertainty']))
     if sheet['stuck_leg']:
         lines += stuck_lines(sheet['stuck_leg'])
     for name, words in (('box', box_verdict), ('motion', motion_verdict)):
@@ -132,6 +134,17 @@ def sheet_text(sheet: dict[str, Any]) -> str:
             lines.append('  payload at the pivot that can be added in the motion: '
                          f'{down(motion["payload"]["value"])} kg')
     return '\n'.join(lines)
+
+
+def uncertain_line(found: Mapping[str, Any]) -> str:
+    """Return the band of the payload over the hexapods that the file admits."""
+    count, band = found['hexapods'], found['payload']
+    if band['low'] is None:
+        return f'payload of {count} hexapods that the file admits: not limited'
+    text = (f'payload at the pivot, at rest, of 95 % of {count} hexapods that the file admits: '
+            f'{down(band["low"])} to {down(band["high"])} kg')
+    return text + (f'; {100.0 * found["overloaded"] / count:.3g} % carry no payload'
+                   if found['overloaded'] else '')
 
 
 def stuck_lines(found: Mapping[str, Any]) -> list[str]:

@@ -54,7 +54,8 @@ def loaded(motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
 
 
 def solve(hexapod: Records, motions: Array, wrenches: Array | None = None,
-          bases: Array | None = None, condition: bool = True) -> Array:
+          bases: Array | None = None, condition: bool = True, results: Array | None = None,
+          ) -> Array:
     """
     Return the rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
 
@@ -65,11 +66,13 @@ def solve(hexapod: Records, motions: Array, wrenches: Array | None = None,
     bases (N, BASE) or (1, BASE): rows of the base's motion, one row for all; without them it is
         still.
     condition: whether the condition number, half of the work, is computed; else it is zero.
+    results (N, RESULT): where they are written; by default a new array.
     """
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     bases = _NO_BASE if bases is None else compact(bases)
-    results = np.empty((len(motions), WIDTHS[hexapod['leg_kind'].item()]))
+    if results is None:
+        results = np.empty((len(motions), WIDTHS[hexapod['leg_kind'].item()]))
     in_parts(_solve, (hexapod, condition), motions, wrenches, bases, results)
     return results
 
@@ -155,14 +158,15 @@ def unreached(joints: Sequence[str], distances: Array) -> str:
 
 
 def in_parts(compute: Callable[..., object], constants: tuple[Any, ...], *arrays: NDArray[Any],
-             ) -> None:
+             least: int = _SAMPLES_FOR_A_THREAD) -> None:
     """
     Call a function with constants and rows of arrays; large batches in parts on all processors.
 
     The first array has as many rows as there are samples. One with a single row is for all parts.
+    least: samples for one thread at least.
     """
     samples = len(arrays[0])
-    threads = min(_CPUS, samples // _SAMPLES_FOR_A_THREAD)
+    threads = min(_CPUS, samples // least)
     if threads < 2:
         compute(*constants, *arrays)
         return

@@ -68,6 +68,11 @@ MOST_POINTS = 32
 """Points that each of LISTS may have; the structure has room for three torques at each speed."""
 
 
+def not_set(name: str) -> float:
+    """Return the number that stands for a parameter that is not set."""
+    return _IF_NOT_SET.get(name, math.nan)
+
+
 def structure_of(parameters: Parameters, with_motors: bool, suppressing: str) -> Records:
     """
     Return the complete structure () of parameters, without a payload and axes of joints.
@@ -80,7 +85,7 @@ def structure_of(parameters: Parameters, with_motors: bool, suppressing: str) ->
     for fields, of in ((LEG_FIELDS, legs), (kind.fields, legs), (PLATFORM_FIELDS, hexapod)):
         for field, name in fields.items():
             value = parameters[name]
-            of[field] = _IF_NOT_SET.get(name, math.nan) if value is None else value
+            of[field] = not_set(name) if value is None else value
     kind.write_fields(legs, parameters)
     for field, name in LISTS.items():
         points = parameters[name]

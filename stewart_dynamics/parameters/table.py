@@ -614,7 +614,8 @@ class CueingGroup(ParameterGroup):
 
 def _deviation(text: str, unit: str, default: float | None) -> Any:
     return declare(f'standard deviation of {text}; a prior of stewart_identify and '
-                   '~/identify_payload', unit, default, minimum=0.0)
+                   '~/identify_payload, drawn by --uncertainty of programs', unit, default,
+                   minimum=0.0)
 
 
 class UncertaintyGroup(ParameterGroup):

@@ -42,7 +42,7 @@ from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
     base64_of, decimals_of, link, link_to_other, page, plotly_script)
 from stewart_dynamics.reporting.plots import (
-    base_wrench_plots, measured_plots, motion_plots, plotted, spectrum_plots)
+    base_wrench_plots, measured_plots, motion_plots, plotted, spectrum_plots, uncertain_plots)
 from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.response.recorded_response import Followed
@@ -70,7 +70,7 @@ class Report:
     """
 
     def __init__(self, parameters: Parameters, measured: bool = False,
-                 folder: Path | None = None) -> None:
+                 folder: Path | None = None, uncertain: bool = False) -> None:
         self._parameters = parameters
         self._legs: tuple[str, ...] = parameters.joints
         self._plotted = plotted(parameters)
@@ -87,10 +87,11 @@ class Report:
         self._places_compared: dict[str, slice] = {}
         self._angles: Array = np.zeros((1, 3))
         self._first: Array | None = None  # position [m]
+        self._uncertain = uncertain
         self._operating = OperatingPoints() if parameters.drives else None
 
-    def add(self, block: Answered) -> None:
-        """Add setpoints, at least one, with their breakdown."""
+    def add(self, block: Answered, bands: Array | None = None) -> None:
+        """Add setpoints, at least one, with their breakdown, and the bands of their efforts."""
         seconds, setpoints, outputs, base_wrenches, powers, breakdown = block
         assert breakdown is not None
         motions, positions = setpoints.motions, outputs.drive_positions
@@ -114,6 +115,8 @@ class Report:
             'breakdown': breakdown[:, :self._sources].reshape(len(seconds), -1),
             'joint_angles': np.degrees(outputs.joint_angles),
             'clearances': outputs.clearances}
+        if bands is not None:
+            quantities['uncertain'] = bands
         if self._operating is not None:
             motors = Motors.of_rows(outputs.motors)
             with np.errstate(invalid='ignore'):
@@ -189,7 +192,8 @@ class Report:
         curves = _lines(self._curves)
         plots = [] if self._first is None else [
             *motion_plots(p, self._places, known, self._first.tolist()),
-            *base_wrench_plots(self._places)]
+            *base_wrench_plots(self._places),
+            *(uncertain_plots(p, self._places) if self._uncertain else [])]
         density = self._spectrum.density()
         if density is not None:
             plots += spectrum_plots(density, len(curves))

@@ -16,7 +16,7 @@ from contextlib import closing, ExitStack
 import hashlib
 import json
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
@@ -52,6 +52,9 @@ from stewart_dynamics.setpoints.rejections import OUT_OF_REACH, Rejection, stamp
 from stewart_dynamics.setpoints.step import Batch, FIRST, Step
 from stewart_dynamics.setpoints.unanswered import unanswered
 from stewart_dynamics.whole_file import write_json
+
+if TYPE_CHECKING:
+    from stewart_dynamics.replay.uncertain_loads import UncertainLoads
 
 VERSION = 1  # version of summary.json; increased when the meaning of a key changes
 
@@ -182,11 +185,19 @@ class _Run:
                 MEASURED_POSE: str(options.measured_table)}, self._setpoints.reject,
         ) if options.response else None
         self.followed: Followed | None = None
+        self._uncertain: UncertainLoads | None = None
+        if options.uncertainty:  # imported where it is used: the simulator is as large as the rest
+            from stewart_dynamics.replay import uncertain_loads
+
+            self._uncertain = uncertain_loads.UncertainLoads(parameters, options.uncertainty)
+            if not any(name.startswith('uncertainty.') for name in parameters.given):
+                self.notices.append('uncertainty.* are not given: the defaults are weak')
         self._response_missing = ''
         self._first_measured = True
         self.report: Report | None = None
         if options.report:
-            self.report = Report(parameters, options.measured is not None, folder)
+            self.report = Report(parameters, options.measured is not None, folder,
+                                 options.uncertainty > 0)
             self._breakdown = ForceBreakdownRows(parameters)
         files = OutputProcess if bytes_of(recording.path) > _LARGE else OutputFiles
         self._files = files(folder, parameters, options, self._quasi_static,
@@ -294,6 +305,7 @@ class _Run:
             'measured': measured and {
                 'headline': measured_headline(measured, self._parameters.leg_kind), **measured},
             'response': self.followed and self.followed.values,
+            'uncertainty': self._uncertain and self._uncertain.values(),
             'parameters': self._parameters.plain(),
         }
 
@@ -335,10 +347,11 @@ class _Run:
         self._files.write(block)
         if self._with_servos:
             self._note_servos(block)
+        bands = None if self._uncertain is None else self._uncertain.add(block)
         if self.report is not None:
             block = block._replace(breakdown=self._breakdown(
                 setpoints.motions, setpoints.wrenches, setpoints.bases))
-            self.report.add(block)
+            self.report.add(block, bands)
         self._summary.add(block)
         if self._comparison is not None:
             self._compared(self._comparison.add_setpoints(block.seconds, setpoints, outputs))

@@ -90,6 +90,10 @@ def _arguments() -> argparse.ArgumentParser:
     poses.add_argument('--cutoff', type=frequency, metavar='HZ',
                        help=f'cut-off frequency of the splines (default: {_CUTOFF:g}); as low as '
                             'the motion allows: noise grows with its power of 2.5')
+    parser.add_argument_group('how certain it is').add_argument(
+        '--uncertainty', type=whole(2, 1_000_000), default=0, metavar='N',
+        help='compute the loads on N hexapods as well that uncertainty.* of the file admits: '
+             'bands of the peaks, and how many exceed a limit; on a GPU if there is one')
     output = parser.add_argument_group('what is written')
     add_report(output)
     output.add_argument('--plotly', choices=('inline', 'shared'), default='inline',
@@ -114,7 +118,8 @@ def _options(given: argparse.Namespace) -> Options:
         measured=given.measured or None, response=given.response,
         measured_pose=given.measured_pose or None,
         motor_torque=given.motor_torque, motor_current=given.motor_current,
-        parquet=given.parquet, report=given.report, force=given.force, params=str(given.params))
+        uncertainty=given.uncertainty, parquet=given.parquet, report=given.report,
+        force=given.force, params=str(given.params))
 
 
 def _run(given: argparse.Namespace, options: Options) -> int:

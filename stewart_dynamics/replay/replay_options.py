@@ -39,6 +39,7 @@ class Options(NamedTuple):
     """Topic or table of the achieved poses; None: those of the measured legs."""
     motor_torque: bool = False  # measured efforts are motor torques [N m]
     motor_current: bool = False  # measured efforts are motor currents [A]
+    uncertainty: int = 0  # hexapods that the file admits, on which the loads are computed as well
     parquet: bool = False  # write legs.parquet in place of legs.csv
     report: bool = True  # write report.html
     plotly: Path | None = None

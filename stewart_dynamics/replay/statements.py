@@ -21,7 +21,7 @@ from stewart_dynamics.mechanics.limits import (
     PLATFORM_ANGLE_MAX, SPEED_MAX, TEMPERATURE_RISE_MAX, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.replay.motor_loads import NEEDS
-from stewart_dynamics.replay.summary import kind_in, margin_key, unit_key
+from stewart_dynamics.replay.summary import kind_in, LegKeys, margin_key, unit_key
 from stewart_dynamics.reporting.pages import decimals_of, fixed
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, OUT_OF_REACH, Rejection
 
@@ -189,11 +189,34 @@ def _limits(summary: Summary) -> Iterator[Statement]:
         yield Statement(_topic(name), 'warn', f'{name} could not be checked{why}')
     unreachable = [each for each in summary.get('rejected', ())
                    if each['reason'] == OUT_OF_REACH]
+    yield from _uncertain(summary)
     problems = (points['jumps'] or summary['limits'] or summary['limits_not_checked']
                 or unreachable)
     if not problems and _has_margins(summary['legs']):
         yield (Statement(LIMITS, 'warn', 'no limit was met by inputs that contradict each other')
                if _contradicting(summary) else _held(summary, LIMITS, 'all limits'))
+
+
+def _uncertain(summary: Summary) -> Iterator[Statement]:
+    """Yield what the uncertainty of the file does to loads and their limits."""
+    found = summary.get('uncertainty')
+    if not found:
+        return
+    effort, count = kind_in(summary['legs']).effort, found['hexapods']
+    key = LegKeys.of(kind_in(summary['legs'])).effort_peak
+    if highest := values_of(found['legs'], f'{key}_high'):
+        value, leg = max(highest, key=FIRST)
+        yield Statement(
+            LIMITS, 'none', f'peak {effort.name} of {leg}: '
+            f'{found["legs"][leg][f"{key}_low"]:.4g} to {value:.4g} {effort.unit} in 95 % of '
+            f'{count} hexapods that the file admits')
+    for each in found['limits']:
+        share = f'{100.0 * each["share"]:.3g} %'
+        yield Statement(
+            _topic(each['limit']), 'warn' if each['hexapods'] else 'good',
+            f'{each["limit"]} is exceeded in {share} of the hexapods that the file admits '
+            f'({each["hexapods"]} of {count})' if each['hexapods'] else
+            f'{each["limit"]} is held in all {count} hexapods that the file admits')
 
 
 def _held(summary: Summary, topic: str, limits: str) -> Statement:

@@ -213,6 +213,18 @@ def measured_plots(p: Parameters, at: Places) -> list[Plot]:
              "about the platform's origin, base axes", contacts=True, spikes=True)]
 
 
+def uncertain_plots(p: Parameters, at: Places) -> list[Plot]:
+    """Return the plot of the efforts within the uncertainty of the parameters."""
+    effort, first = p.leg_kind.effort, at['uncertain'].start
+    return [Plot(
+        'uncertain', f'Leg {effort.name} on the hexapods that the file admits', effort.unit, {
+            leg: [Curve('computed', LEG_COLORS[n], at[effort.name].start + n),
+                  Curve('2.5 %', ROLES['faint'], first + n),
+                  Curve('97.5 %', ROLES['faint'], first + 6 + n)]
+            for n, leg in enumerate(p.joints)},
+        '95 % of the hexapods are between the lines, at each setpoint', spikes=True)]
+
+
 def _of_motors(p: Parameters, at: Places, velocities_known: bool) -> Iterator[Plot]:
     yield _bounded(p, [TORQUE_MAX], 'Torques of the motors', at['torques'],
                    'demanded by the motion, + extends', both=True, spikes=True)
