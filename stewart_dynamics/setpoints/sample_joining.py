@@ -10,6 +10,7 @@ Joins samples of several topics by stamp, and counts rejected samples.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 import math
 from typing import NamedTuple
 
@@ -18,10 +19,10 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Integers, SECOND, Stamps
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.messages.stamp_order import NO_STAMP, Order, order_of
 from stewart_dynamics.setpoints.input_messages import SampleReader, TopicSamples
 from stewart_dynamics.setpoints.rejections import (
-    jumped_back, NOT_JOINED, Rejections, stamp_words, STAMP_ZERO)
-from stewart_dynamics.setpoints.stamp_order import NO_STAMP, Order, order_of, reason_of
+    check_stamp, jumped_back, NOT_JOINED, Rejections, stamp_words, STAMP_ZERO)
 
 # Maximum number of samples of a topic that wait for samples of the other topics, and depth of the
 # queues in the middleware, which may deliver all messages of one topic before another topic's.
@@ -228,10 +229,9 @@ class SampleJoining:
         """Return whether a sample is in time; reject it otherwise."""
         # A sample that still waits is followed as the last used one is.
         last = stamp if stamp in self._waiting[topic] else self._last.get(topic)
-        order = order_of(stamp, last, self._timeout)
-        if last is not None and not order.used:
-            self._reject(topic, *reason_of(order, stamp, last))
-        return order.used
+        # A restart is noticed where the sample is joined.
+        return check_stamp(
+            stamp, last, self._timeout, partial(self._reject, topic), lambda text: None)
 
     def _join(self, stamp: int) -> JoinedSample | None:
         """Return the joined sample that a sample completes, if stamps are within the tolerance."""
