@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND
+from stewart_dynamics.bags.feed import read_all, Subscription
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.messages import type_names
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.tables.column_names import ACCELERATION, ANGULAR_VELOCITY, TIME
@@ -75,7 +77,8 @@ def _read_bag(path: Path, given: str | None, reading: Reading) -> RecordedVehicl
     with closing(Recording(path)) as recording:
         topic = recording.find_topic(
             type_names.IMU, given, f'/stewart_cueing/{VEHICLE}', '--vehicle')
-        for messages, _ in recording.messages({topic: VEHICLE}):
+
+        def add(messages: Messages) -> None:
             for _, received, data in messages.each():
                 sample = reader.read(data)
                 if sample is None:
@@ -86,6 +89,8 @@ def _read_bag(path: Path, given: str | None, reading: Reading) -> RecordedVehicl
                     continue
                 stamps.append(stamp)
                 values.append(sample[1])
+
+        read_all(recording, [Subscription({topic: VEHICLE}, add)])
         missing = tuple(recording.missing)
     if not stamps:
         raise BagError(f'{path}: {topic}: no valid message' + (
