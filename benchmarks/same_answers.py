@@ -200,7 +200,7 @@ def parameters_of(given: dict[str, Any]) -> Any:
 
 def joined(given: dict[str, Any], found: list[tuple[str, int, bytes]], cuts: list[int] | None,
            ) -> dict[str, str]:
-    """Return the digests of what the joining gives: message by message, or in blocks."""
+    """Return the digests of joined messages: one by one, or in blocks."""
     from stewart_dynamics.messages.recorded import Messages
     from stewart_dynamics.setpoints.joining import Setpoints
     said: list[tuple[Any, str]] = []

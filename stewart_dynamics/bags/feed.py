@@ -14,7 +14,7 @@ from stewart_dynamics.messages.recorded import Messages
 
 
 class Subscription(NamedTuple):
-    """What a subscriber takes of a recording."""
+    """Topics of a recording, and the function that uses their messages."""
 
     topics: Mapping[str, str]
     """From topics in the recording, several separated by commas, to their names in messages."""

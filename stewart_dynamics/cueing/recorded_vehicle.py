@@ -73,22 +73,22 @@ def _read_bag(path: Path, given: str | None, reading: Reading) -> RecordedVehicl
         lambda rejection, details: said.append(rejection.words(details)))
     reader = SampleReader(VEHICLE, None, rejections)
     stamps: list[int] = []
-    values: list[tuple[float, ...]] = []
+    values: list[list[float]] = []
     with closing(Recording(path)) as recording:
         topic = recording.find_topic(
             type_names.IMU, given, f'/stewart_cueing/{VEHICLE}', '--vehicle')
 
         def add(messages: Messages) -> None:
-            for _, received, data in messages.each():
-                sample = reader.read(data)
-                if sample is None:
+            samples = reader.read_samples(messages.data, messages.starts, messages.sizes)
+            received = messages.times[samples.places]
+            for stamp, time, row in zip(samples.stamps.tolist(), received.tolist(),
+                                        samples.values.tolist(), strict=True):
+                at = stamp or time
+                if stamps and at <= stamps[-1]:
+                    rejections.reject(VEHICLE, 'not strictly increasing', f'stamp {at} ns')
                     continue
-                stamp = sample[0] or received
-                if stamps and stamp <= stamps[-1]:
-                    rejections.reject(VEHICLE, 'not strictly increasing', f'stamp {stamp} ns')
-                    continue
-                stamps.append(stamp)
-                values.append(sample[1])
+                stamps.append(at)
+                values.append(row)
 
         read_all(recording, [Subscription({topic: VEHICLE}, add)])
         missing = tuple(recording.missing)

@@ -197,7 +197,7 @@ class Vehicle:
 
     def take(self, data: bytes, now: float) -> None:
         """Take a message at a time [s]."""
-        read = self._reader.read(data)
+        read = self._reader.read_sample(data)
         if read is None or not self._in_order(read[0]):
             return
         rates, forces = read[1][:3], read[1][3:]

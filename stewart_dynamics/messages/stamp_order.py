@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from enum import Enum
 
+from stewart_dynamics.core.binding import CODES, function
+
 NO_STAMP = 0
 """A stamp of zero is no time, whatever came before: the message has no stamp."""
 
@@ -32,8 +34,7 @@ def order_of(stamp: int, last: int | None, timeout: int) -> Order:
     stamp, last: [ns], not NO_STAMP; None before the first.
     timeout: longest time by which messages are late [ns]; a longer jump back is a restart.
     """
-    if last is None or stamp > last:
-        return Order.FRESH
-    if stamp == last:
-        return Order.TWICE
-    return Order.TOO_OLD if last - stamp <= timeout else Order.RESTART
+    return _ORDERS[function('stamp_order')(stamp, last is not None, last or 0, timeout)]
+
+
+_ORDERS = {CODES[f'STAMP_{order.name}']: order for order in Order}

@@ -180,7 +180,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._heard[topic] = came
         self._rested = self._rested or came - self._handled > _REST
         if not self._exclusive or self._is_only_writer(topic):
-            setpoint = self._setpoints.take([(topic, data, self._ros_time)])
+            setpoint = self._setpoints.join_message(topic, data, self._ros_time)
             if len(setpoint.stamps):
                 self._waiting.append((setpoint, came))
                 if not self._gathering:
@@ -294,12 +294,12 @@ class DynamicsNode(ManagedNode[Parameters]):
             self._diagnostics.base.heard[topic] = now
             if self._exclusive and not self._is_only_writer(topic):
                 return
-            if self._setpoints.base.take(topic, data, self._ros_time):
+            if self._setpoints.base.join_message(topic, data, self._ros_time):
                 self._diagnostics.base.sampled(self._setpoints.base, now)
 
     def _on_wrench(self, data: bytes) -> None:
         if self._active:
-            self._setpoints.take([(WRENCH, data, self._ros_time)])
+            self._setpoints.join_message(WRENCH, data, self._ros_time)
 
     def _on_measured_legs(self, data: bytes) -> None:
         if not self._active:

@@ -194,7 +194,7 @@ class _Run:
         stack.callback(self._files.abandon)
 
     def subscriptions(self) -> list[Subscription]:
-        """Return what it takes of the recording: of each block the measured legs first."""
+        """Return the subscriptions: of each block the measured legs come first."""
         measured, setpoints = ({name: key for key, name in self._topics.items()
                                 if (key in (MEASURED, MEASURED_POSE)) is wanted}
                                for wanted in (True, False))
@@ -204,7 +204,7 @@ class _Run:
     def _take_setpoints(self, messages: Messages) -> None:
         """Answer messages of setpoints, base and external wrench."""
         self._files.write_inputs(messages)
-        setpoints = self._setpoints.take(messages)
+        setpoints = self._setpoints.join_messages(messages)
         if self._differentiator is not None:
             setpoints = self._differentiator.add(setpoints)
         self._answer(setpoints)

@@ -65,7 +65,7 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         setpoints.unknown_angles = recording.unknown_angles
 
         def add(messages: Messages) -> None:
-            batch = setpoints.take(messages)
+            batch = setpoints.join_messages(messages)
             batches.append(batch if splines is None else splines.add(batch))
 
         for size in feed_subscribers(recording, [

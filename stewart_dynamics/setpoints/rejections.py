@@ -65,6 +65,11 @@ def stamp_of(details: str) -> tuple[int | None, str]:
     return (int(found[1]), details[found.end():]) if found else (None, details)
 
 
+def too_old(stamp: int, back: int) -> str:
+    """Return the details of a stamp that lies back by a time [ns]."""
+    return f'{stamp_words(stamp)} is {back / SECOND:g} s older than the last used'
+
+
 def jumped_back(back: int) -> str:
     """Return the notice of a restart by a time [ns]."""
     return f'stamps jumped back by {back / SECOND:g} s: followed as a restart'
@@ -86,8 +91,7 @@ def check_stamp(stamp: int, last: int | None, timeout: int, reject: Callable[[st
         if order is Order.RESTART:
             noticed(jumped_back(back))
         else:
-            reject(TOO_OLD, f'{stamp_words(stamp)} is {back / SECOND:g} s older than the last '
-                            'used')
+            reject(TOO_OLD, too_old(stamp, back))
     return order.used
 
 
