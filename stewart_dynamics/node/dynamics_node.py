@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 import math
 import time
@@ -63,12 +63,15 @@ class _Models(NamedTuple):
     """Models that share one set of parameters."""
 
     step: Step
+    write_answer: Callable[[], dict[str, bytes]]  # the messages of the step's last answer
     external_wrench: ExternalWrench
     base_wrench: BaseWrench
 
     @classmethod
     def of(cls, parameters: Parameters) -> _Models:
-        return cls(Step(parameters), ExternalWrench(parameters), BaseWrench(parameters))
+        step = Step(parameters)
+        return cls(step, OutputMessages(parameters).bound_to(step), ExternalWrench(parameters),
+                   BaseWrench(parameters))
 
 
 class DynamicsNode(ManagedNode[Parameters]):
@@ -225,8 +228,7 @@ class DynamicsNode(ManagedNode[Parameters]):
                 self._setpoints.reject('setpoint', *reason)
             return
         publishers = self._topics.publishers
-        answered = {topic: messages.tobytes()
-                    for topic, _, messages in self._messages.of(outputs)}
+        answered = self._models.write_answer()
         for topic, message in answered.items():
             publishers[topic].publish(message)
         if self._simulated:

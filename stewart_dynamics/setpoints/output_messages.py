@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.step import (
     CHANGED, FINITE_MOTORS, MOTOR_ANGLES, MOTOR_COMMANDS, MOTOR_SPEEDS, OUTPUT, Outputs, POSITIONS,
-    WARNING_STATE)
+    Step, WARNING_STATE)
 
 LEG_STATES, DETERMINANT, WARNING = (
     'leg_states', 'jacobian_determinant', 'singularity_warning')
@@ -67,7 +67,7 @@ MOTOR_TYPES = {
 
 class OutputMessages:
     """
-    Writes the output messages; not thread-safe, as the step.
+    Writes the output messages.
 
     types: topics that the hexapod has, and their types.
     """
@@ -104,6 +104,10 @@ class OutputMessages:
         Returns topics, which outputs have a message (N,), and the messages (N,), of one length.
         """
         return self._of_outputs.write(outputs.stamps, outputs.rows)
+
+    def bound_to(self, step: Step) -> Callable[[], dict[str, bytes]]:
+        """Return a function that returns the messages of the last single setpoint of a step."""
+        return self._of_outputs.bound(*step.last_one)
 
     def of_wrench(self, stamp: int, wrench: Sequence[float]) -> bytes:
         """Return the geometry_msgs/WrenchStamped of a wrench in base axes."""
