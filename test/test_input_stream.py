@@ -14,6 +14,7 @@ from referees import rng, symmetric_parameters
 from stewart_dynamics.mechanics.frames.base_motion import row_of_motion, row_of_pose
 from stewart_dynamics.setpoints.input_messages import (
     BASE_ACCEL, BASE_POSE, BASE_TWIST, COMBINED, POSE, WRENCH)
+from stewart_dynamics.setpoints.rejections import MALFORMED
 
 TOPICS = (POSE, COMBINED, BASE_POSE, BASE_TWIST, BASE_ACCEL, WRENCH)
 
@@ -51,6 +52,18 @@ def test_messages_of_any_length_are_read() -> None:
     given = [(COMBINED, messages.combined(n * MS, names=['a' * size]))
              for n, size in enumerate((1, 5000, 3, 60_000, 70_000), 1)]
     assert messages.check_many(Feed('combined'), Feed('combined'), given, TOPICS, [2]) == 5
+
+
+def test_empty_messages_are_malformed_whether_a_layout_is_known_or_not() -> None:
+    feed = Feed(base='pose')
+    for topic in (POSE, BASE_POSE, WRENCH) * 2:
+        assert feed(topic, b'') is None
+        feed(topic, messages.pose(SECOND + len(feed.said) * MS))
+    assert [feed.counts[topic, MALFORMED] for topic in (POSE, BASE_POSE, WRENCH)] == [2, 2, 2]
+    found = Feed()
+    assert not len(found.setpoints.join_messages(
+        messages.together([(POSE, b''), (WRENCH, b'')], TOPICS)).stamps)
+    assert found.counts == {(POSE, MALFORMED): 1, (WRENCH, MALFORMED): 1}
 
 
 def test_blocks_of_a_base_may_have_faults_or_none() -> None:

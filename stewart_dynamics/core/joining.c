@@ -413,7 +413,7 @@ static void put_setpoint(
 static int read_sample(
   const message_layout * layout, int64_t size, const uint8_t * from, int64_t * stamp,
   double * values) {
-  return size == layout->size && is_alike(from, layout->message, layout->fixed, size) &&
+  return layout->message && size == layout->size && is_alike(from, layout->message, layout->fixed, size) &&
     take_sample(from, layout->n_parts, layout->parts, layout->quaternion, layout->n_measured,
                 layout->measured, layout->largest, stamp, values);
 }
