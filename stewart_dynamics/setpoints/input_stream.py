@@ -115,7 +115,7 @@ class InputStream:
         self._data, self._message, self._room = data.data, whole.data, size
         memory, self._join_one = self._bound(
             1, whole[0:1], whole[1:2], data, whole[2:3], whole[3:4])
-        # What a message completes: nothing, a setpoint, or a sample of the base.
+        # A message completes nothing, a setpoint, or a sample of the base.
         self._of_one = {each: _part(memory, *each) for each in ((0, 0), (1, 0), (0, 1))}
 
     def _bound(self, count: int, topics: Integers, times: Stamps, data: Any, starts: Integers,
@@ -131,7 +131,7 @@ class InputStream:
             progress)
 
     def join_message(self, topic: str, data: bytes, clock: Clock) -> Joined:
-        """Join one message; what it completes is valid until the next call."""
+        """Join one message; the result is valid until the next call."""
         size = len(data)
         if size > self._room:
             self._make_memory_of_one(2 * size)
