@@ -132,7 +132,7 @@ def put(base: BaseInput, writers: dict[str, StampedWriter], motion: Motion, stam
     for topic, values in (
             (BASE_POSE, (*motion.position, *motion.quaternion)),
             (BASE_TWIST, motion.rows[12:18]), (BASE_ACCEL, motion.rows[18:24])):
-        base.take(topic, writers[topic].write(stamp, values), lambda: stamp)
+        base.join_message(topic, writers[topic].write(stamp, values), lambda: stamp)
 
 
 def rms(values: Any) -> float:

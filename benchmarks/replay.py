@@ -91,7 +91,7 @@ setpoints = Setpoints(Parameters.from_yaml({str(PARAMETERS)!r}), print, print)
 topics = {{f'/stewart_dynamics/{{topic}}': topic for topic in SOURCES['separate']}}
 with closing(Recording(Path(sys.argv[1]))) as recording:
     for messages, _ in recording.messages(topics):
-        many += len(setpoints.take(messages).stamps)
+        many += len(setpoints.join_messages(messages).stamps)
 many *= 3
 """
 REPLAY = f"""

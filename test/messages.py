@@ -16,6 +16,7 @@ from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.setpoints.input_messages import SampleReader
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import Rejection
 from stewart_dynamics.setpoints.step import Batch
@@ -50,7 +51,7 @@ class Feed:
 
     def __call__(self, topic: str, data: bytes, now: int = NOW) -> Batch | None:
         """Take one message as the node does, at a time [ns]; return the setpoint it completes."""
-        setpoint = self.setpoints.take([(topic, data, lambda: now)])
+        setpoint = self.setpoints.join_message(topic, data, lambda: now)
         return setpoint if len(setpoint.stamps) else None
 
     @property
@@ -58,6 +59,19 @@ class Feed:
         """Return the rejections; the callback must have got each."""
         assert Counter(rejection for rejection, _ in self.said) == self.setpoints.counts
         return {(topic, reason): n for (topic, reason), n in self.setpoints.counts.items()}
+
+
+def count_read_fields(patch: Any) -> Counter[str]:
+    """Return the messages of each topic that are read field by field from now on."""
+    read: Counter[str] = Counter()
+    read_fields = SampleReader.read_fields
+
+    def count(reader: SampleReader, data: bytes) -> Any:
+        read[reader.topic] += 1
+        return read_fields(reader, data)
+
+    patch.setattr(SampleReader, 'read_fields', count)
+    return read
 
 
 def together(given: Sequence[tuple[str, bytes]], topics: Sequence[str]) -> Messages:
@@ -78,7 +92,7 @@ def check_many(one: Feed, many: Feed, given: Sequence[tuple[str, bytes]], topics
                 if (setpoint := one(topic, data, time)) is not None]
     whole, number = together(given, topics), 0
     for first, end in pairwise([0, *sorted(cut for cut in cuts if cut < len(given)), len(given)]):
-        found = many.setpoints.take(whole.chosen(slice(first, end)))
+        found = many.setpoints.join_messages(whole.chosen(slice(first, end)))
         assert found.moving == bool(many.setpoints.base.topics)
         for n, (setpoint, time) in enumerate(expected[number:number + len(found.stamps)]):
             assert (found.stamps[n], found.times[n]) == (setpoint.stamps[0], time)

@@ -23,13 +23,11 @@ from sensor_msgs.msg import Imu
 from stewart_dynamics import BaseMotion, Motion, Pose
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.setpoint import imu, layout_of
-from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.input_messages import (
     BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, LARGEST, POSE, WRENCH)
 from stewart_dynamics.setpoints.rejections import (
     MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE, TOO_OLD, TWICE,
     WRONG_FRAME)
-from stewart_dynamics.setpoints.sample_joining import SampleJoining
 
 MS = 1_000_000
 SECOND = 1000 * MS
@@ -358,15 +356,16 @@ def test_many_are_what_they_are_one_by_one(
         Feed(source), Feed(source), recorded(source, fates, period), TOPICS, cuts)
 
 
-def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_ordinary_messages_the_first_of_a_topic_is_read_field_by_field(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     for source in SOURCES:
         given = recorded(source, ['good'] * 50, 2)
         feed = Feed(source)
         with monkeypatch.context() as patch:
-            patch.delattr(BaseInput, 'take')
-            patch.delattr(SampleJoining, 'take')
-            bases = [feed.setpoints.take(messages.together(part, TOPICS)).bases
+            read = messages.count_read_fields(patch)
+            bases = [feed.setpoints.join_messages(messages.together(part, TOPICS)).bases
                      for part in (given[:103], given[103:])]
+        assert read == dict.fromkeys((POSE, *BASE_SOURCES[source]), 1)
         assert all(map(np.any, map(np.isfinite, bases)))
         assert not feed.said
         messages.check_many(Feed(source), Feed(source), given, TOPICS, [103])

@@ -56,7 +56,7 @@ class OnBase:
         """Publish messages, and take them here as well."""
         for topic, data in given:
             self._writers[topic].publish(data)
-            self.samples += self.base.take(topic, data, lambda: 0)
+            self.samples += self.base.join_message(topic, data, lambda: 0)
 
     def send(self, stamp: int, mark: float = 0.0) -> None:
         """Publish a sample of the base, and wait until the node has it."""
@@ -191,7 +191,7 @@ def test_a_stream_at_any_rate_is_followed(fresh: Start, rate: int) -> None:
         base = BaseInput(platform.parameters.replaced({'base.source': 'motion'}),
                          Rejections(lambda *why: None), lambda text: None)
         for topic, data in given(t, pose, twist, accel):
-            base.take(topic, data, lambda: 0)
+            base.join_message(topic, data, lambda: 0)
         assert base.last is not None
         return platform.inverse_dynamics(
             MOVING.motion(), base=BaseMotion.of_rows(np.array(base.last[1]))).forces

@@ -674,7 +674,7 @@ def test_measured_legs_are_rejected_until_the_base_is_known() -> None:
     followed = Followed(parameters)
     followed.base = base
     followed.rejects(message_of(REST[0]), BASE_NOT_KNOWN, f'stamp {BEGIN} ns')
-    base.take(BASE_IMU, imu(BEGIN, force=(0.0, 0.0, 9.80665)), lambda: 0)
+    base.join_message(BASE_IMU, imu(BEGIN, force=(0.0, 0.0, 9.80665)), lambda: 0)
     found = [followed.take(message_of(each)) for each in REST]
     assert len(followed.rejected) == 1
     last = found[-1]

@@ -233,7 +233,7 @@ def diagnostics(*topics: str) -> DynamicsDiagnostics:
 def base_with_a_sample() -> BaseInput:
     """Return an input that has one sample of an IMU."""
     base = BaseInput(PARAMETERS, Rejections(lambda *why: None), lambda text: None)
-    base.take(BASE_IMU, messages.imu(STAMP, (0.25, 0.0, 0.0)), lambda: 0)
+    base.join_message(BASE_IMU, messages.imu(STAMP, (0.25, 0.0, 0.0)), lambda: 0)
     return base
 
 

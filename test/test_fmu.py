@@ -150,7 +150,7 @@ def test_figure_18(unit: Unit) -> None:
     bag = ROOT / 'bags' / 'singular'
     setpoints = Setpoints(PARAMETERS, lambda rejection, details: None, print)
     with closing(Recording(bag)) as recording:
-        parts = [setpoints.take(messages) for messages, _ in recording.messages(
+        parts = [setpoints.join_messages(messages) for messages, _ in recording.messages(
             {f'/stewart_dynamics/{topic}': topic for topic in setpoints.topics})]
     expected = Step(PARAMETERS)(Batch.joined(parts))
     unit.fmu.exitInitializationMode()

@@ -249,7 +249,7 @@ def test_setpoints_of_the_lower_hexapod_are_the_motion_of_the_upper_ones_base() 
     given = (messages.pose(SECOND, (0.1, 0.2, 1.1), quaternion, 'ground'),
              messages.twist(SECOND, twist, 'ground'), messages.accel(SECOND, accel, 'ground'))
     for topic, data in zip(BASE_SOURCES['motion'], given, strict=True):
-        base.take(topic, data, lambda: 0)
+        base.join_message(topic, data, lambda: 0)
     assert np.allclose(base.at(SECOND), BaseMotion.from_motion(carrier).rows, rtol=0.0, atol=1e-13)
 
 

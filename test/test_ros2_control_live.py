@@ -283,8 +283,8 @@ def test_forces_on_an_imu_have_the_bits_of_the_node(program: Path, every: int) -
             reading = np.full(6, np.nan)
         if n % every == 0 and not silent:
             reading = random.normal([0.0, 0.0, 0.0, 0.0, 0.0, 9.8], 0.4)
-            base.take(BASE_IMU, imu(stamp, reading[:3].tolist(), reading[3:].tolist()),
-                      lambda stamp=stamp: stamp)
+            base.join_message(BASE_IMU, imu(stamp, reading[:3].tolist(), reading[3:].tolist()),
+                              lambda stamp=stamp: stamp)
         lost = np.full(6, np.nan) if n == 100 and every > 1 and n % every else reading
         cycles.append(Cycle(stamp, numbers[n], wrench=random.normal(size=6), reading=lost))
         rows.append(base.at(stamp))

@@ -22,11 +22,11 @@ from referees import rng, symmetric_parameters
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics.setpoints.input_messages import (
-    ACCEL, COMBINED, POSE, SampleReader, TWIST, WRENCH)
+    ACCEL, COMBINED, POSE, TWIST, WRENCH)
+from stewart_dynamics.setpoints.input_stream import WAITING
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, TOO_OLD, TWICE,
     WRONG_FRAME)
-from stewart_dynamics.setpoints.sample_joining import SampleJoining, WAITING
 from stewart_dynamics.setpoints.step import Batch
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
@@ -566,14 +566,15 @@ def test_many_in_order_are_what_they_are_one_by_one(cuts: Sequence[int]) -> None
     assert check_many([(topic, good(topic, 0)) for _ in range(3) for topic in TOPICS], cuts) == 3
 
 
-def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_ordinary_messages_the_first_of_a_topic_is_read_field_by_field(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    read = messages.count_read_fields(monkeypatch)
     feed = Feed()
-    monkeypatch.delattr(SampleJoining, 'take')
-    monkeypatch.delattr(SampleReader, 'read')
     given = stream(50)
     for part in (given[:61], given[61:]):
-        feed.setpoints.take(messages.together(part, INPUTS))
+        feed.setpoints.join_messages(messages.together(part, INPUTS))
     assert not feed.counts
+    assert read == dict.fromkeys((*TOPICS, WRENCH), 1)
 
 
 def test_many_of_one_topic_may_come_before_the_others() -> None:

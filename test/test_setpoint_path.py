@@ -129,7 +129,8 @@ def test_the_page_names_the_files_that_a_setpoint_runs_through(domain: int) -> N
     finally:
         each.close()
     # These call functions in C, which no profile sees.
-    for caller, called in (('setpoints/input_messages.py', 'core/messages.c'),
+    for caller, called in (('setpoints/input_stream.py', 'core/messages.c'),
+                           ('setpoints/input_stream.py', 'core/joining.c'),
                            ('setpoints/step.py', 'core/setpoints.c'),
                            ('setpoints/step.py', 'core/stewart_dynamics.c')):
         found.insert(found.index(caller) + 1, called)

@@ -55,7 +55,7 @@ class Recorded(NamedTuple):
         parameters = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
         setpoints = Setpoints(parameters, lambda rejection, details: None, print)
         with closing(Recording(bag)) as recording:
-            parts = [setpoints.take(messages) for messages, _ in recording.messages(
+            parts = [setpoints.join_messages(messages) for messages, _ in recording.messages(
                 {f'{NODE}/{topic}': topic for topic in setpoints.topics})]
         batch = Batch.joined(parts)
         outputs = Step(parameters)(batch)

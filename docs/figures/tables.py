@@ -32,7 +32,7 @@ from stewart_dynamics.parameters.table import BY_IMU, FIXED, Parameters
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.consistency import (
     DELAY, DELAY_IN_SAMPLES, PERIOD, PERSISTENT, SHARE, SLOWEST, TICK, TOLERANCE, WEAKEST)
-from stewart_dynamics.setpoints.sample_joining import WAITING
+from stewart_dynamics.setpoints.input_stream import WAITING
 from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 import yaml
 

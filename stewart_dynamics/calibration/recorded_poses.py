@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND, Stamps
+from stewart_dynamics.bags.feed import read_all, Subscription
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.calibration.measured_poses import (
     drive_unit, MeasuredPoses, METERS, Millimeters)
@@ -21,6 +22,7 @@ from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.messages import setpoint, type_names
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateReader
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import is_unit
 from stewart_dynamics.replay.bag_topics import find_calibrated_legs
@@ -50,26 +52,27 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
     with closing(Recording(path, reading, parameters.platform_frame)) as recording:
         legs_topic, commanded = find_calibrated_legs(recording, node, measured)
         pose_topic = recording.find_topic(type_names.POSE_STAMPED, pose, '', '--pose')
-        topics = {legs_topic: 'legs', pose_topic: 'pose'}
         reader = JointStateReader(parameters.joints, ['position'])
         leg_stamps: list[Stamps] = []
         leg_values: list[Array] = []
         poses: list[tuple[int, tuple[float, ...]]] = []
-        for messages, _ in recording.messages(topics):
-            which = messages.places().get('legs')
-            if which is not None:
-                states = reader.read_many(
-                    messages.data, messages.starts[which], messages.sizes[which])
-                leg_stamps.append(states.stamps)
-                leg_values.append(states.values)
-            for topic, _, data in messages.each():
-                if topic == 'pose':
-                    try:
-                        stamp, _, values = setpoint.pose(data)
-                    except MalformedError:
-                        continue
-                    if np.isfinite(values).all() and is_unit(np.linalg.norm(values[3:])):
-                        poses.append((stamp, values))
+
+        def add_legs(messages: Messages) -> None:
+            states = reader.read_many(messages.data, messages.starts, messages.sizes)
+            leg_stamps.append(states.stamps)
+            leg_values.append(states.values)
+
+        def add_poses(messages: Messages) -> None:
+            for _, _, data in messages.each():
+                try:
+                    stamp, _, values = setpoint.pose(data)
+                except MalformedError:
+                    continue
+                if np.isfinite(values).all() and is_unit(np.linalg.norm(values[3:])):
+                    poses.append((stamp, values))
+
+        read_all(recording, [Subscription({legs_topic: 'legs'}, add_legs),
+                             Subscription({pose_topic: 'pose'}, add_poses)])
         missing = list(recording.missing)
         notices = [*recording.notices, *(
             [f'{legs_topic}: the commanded positions of the legs, not measured ones']
@@ -77,7 +80,7 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
     reader.check(f'{path}: {legs_topic}')
     stamps = np.concatenate(leg_stamps) if leg_stamps else np.empty(0, dtype=np.int64)
     if not len(stamps) or not poses:
-        raise BagError(f'{path}: {" and ".join(topics)}: no valid message of the '
+        raise BagError(f'{path}: {legs_topic} and {pose_topic}: no valid message of the '
                        f'{"poses" if len(stamps) else "legs"}')
     order = np.argsort(stamps, kind='stable')
     of_positions, of_legs = millimeters.units[0], drive_unit(parameters, millimeters, False)

@@ -70,6 +70,7 @@ static void solve_unloaded(
 #include "drives.c"
 #include "home.c"
 #include "imu.c"
+#include "joining.c"
 #include "governor.c"
 #include "cueing.c"
 #include "records.c"

@@ -163,6 +163,69 @@ int64_t read_messages(
   double largest, int64_t width, int64_t count, const uint8_t * data, const int64_t * starts,
   const int64_t * sizes, int64_t * stamps, double * values);
 
+/* How a stamp follows the last used one, if one is known: a stamp that is earlier by more than the
+   timeout is a restart [ns]. */
+enum { STAMP_FRESH = 0, STAMP_RESTART = 1, STAMP_TWICE = 2, STAMP_TOO_OLD = 3 };
+int64_t stamp_order(int64_t stamp, int64_t known, int64_t last, int64_t timeout);
+
+/* What the motion of the base is computed from: a pose at rest, a pose that moves, an IMU. */
+enum { BASE_AT_REST = 1, BASE_MOVING = 2, BASE_BY_IMU = 3 };
+
+/* Why a sample is not used, or what the log is told: its topic, stamps, and which message. */
+enum {
+  EVENT_TWICE = 1, EVENT_TOO_OLD = 2, EVENT_NOT_JOINED = 3, EVENT_UNSTAMPED_DROPPED = 4,
+  EVENT_ENDED = 5, EVENT_BEFORE_RESTART = 6, EVENT_RESTART = 7, EVENT_NOTICE_UNSTAMPED = 8
+};
+typedef struct { int64_t kind, topic, stamp, last, message; } input_event;
+
+/* A sample that is read elsewhere, in place of the next message. */
+enum { SAMPLE_UNREAD = 0, SAMPLE_VALID = 1, SAMPLE_REJECTED = 2 };
+typedef struct { int64_t state, stamp; double values[24]; } given_sample;
+
+/* Why a call returns: all messages are used; the next one has no known layout or is not valid; it
+   has no stamp and needs the clock; events have no room. */
+enum { JOIN_DONE = 0, JOIN_UNREAD = 1, JOIN_CLOCK = 2, JOIN_EVENTS = 3 };
+/* Index of the next message; numbers of setpoints, of samples of the base and of events so far; why
+   the call returns; whether the times are those of a clock. */
+typedef struct { int64_t next, setpoints, bases, events, status, timed; } join_progress;
+
+/* The stream of messages on the topics of setpoints (0, 1, 2), of the base (3, 4, 5) and of the load
+   (6), joined by stamp: see joining.c; of a topic MOST_WAITING samples may wait. widths (6,): numbers of a sample, 0: no such topic; tolerance
+   and timeouts [ns]; source and gravity of the base, world axes. */
+enum { MOST_WAITING = 1000 };
+int64_t input_stream_size(void);
+void begin_stream(
+  uint8_t * memory, const int64_t * widths, int64_t tolerance, int64_t timeout,
+  int64_t base_timeout, int64_t source, const double * gravity, const imu_mounting * imu);
+
+/* The layout of the messages of a topic, as for read_messages: the arrays stay where they are. */
+void put_layout(
+  uint8_t * memory, int64_t topic, int64_t size, const uint8_t * message, const uint8_t * fixed,
+  int64_t n_parts, const message_part * parts, int64_t quaternion, int64_t n_measured,
+  const int64_t * measured, double largest);
+
+/* Join messages (count,) of topics, -1: not used, recorded at times [ns], each at its place in the
+   data, from progress->next on. Setpoints have their stamps [ns] and the index of the message that
+   completed each; samples of the base their stamps, motions, numbers and whether time jumped back. */
+void join_messages(
+  uint8_t * memory, int64_t count, const int64_t * topics, const int64_t * times,
+  const uint8_t * data, const int64_t * starts, const int64_t * sizes, given_sample * given,
+  int64_t * stamps, setpoint * setpoints, int64_t * places, int64_t * base_stamps,
+  stewart_base * bases, double * base_values, double * base_restarts, int64_t event_room,
+  input_event * events, join_progress * progress);
+
+/* Drop what waits of a group, setpoints (0) or base (1); with `restart`, samples of any time follow,
+   and the next setpoint is a restart. */
+void end_stream(
+  uint8_t * memory, int64_t group, int64_t restart, input_event * events, int64_t * n_events);
+
+/* The motion of the base at a stamp, nan if unknown. The last one; returns whether there is one. */
+void base_at(const uint8_t * memory, int64_t stamp, stewart_base * base);
+int64_t last_base(const uint8_t * memory, int64_t * stamp, stewart_base * base);
+
+/* The last load on the platform (6,) [N, N m]. */
+void last_wrench(const uint8_t * memory, double * wrench);
+
 /* Messages (count, size), all kinds side by side: copies of one row of them, with stamps (count,)
    [ns] at some places and numbers of rows (count, width) at others; which kinds (count, n_kinds) a
    row has, and the numbers (n_kinds,) of messages. */

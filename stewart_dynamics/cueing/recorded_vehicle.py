@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND
+from stewart_dynamics.bags.feed import read_all, Subscription
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.messages import type_names
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.tables.column_names import ACCELERATION, ANGULAR_VELOCITY, TIME
@@ -71,21 +73,24 @@ def _read_bag(path: Path, given: str | None, reading: Reading) -> RecordedVehicl
         lambda rejection, details: said.append(rejection.words(details)))
     reader = SampleReader(VEHICLE, None, rejections)
     stamps: list[int] = []
-    values: list[tuple[float, ...]] = []
+    values: list[list[float]] = []
     with closing(Recording(path)) as recording:
         topic = recording.find_topic(
             type_names.IMU, given, f'/stewart_cueing/{VEHICLE}', '--vehicle')
-        for messages, _ in recording.messages({topic: VEHICLE}):
-            for _, received, data in messages.each():
-                sample = reader.read(data)
-                if sample is None:
+
+        def add(messages: Messages) -> None:
+            samples = reader.read_samples(messages.data, messages.starts, messages.sizes)
+            received = messages.times[samples.places]
+            for stamp, time, row in zip(samples.stamps.tolist(), received.tolist(),
+                                        samples.values.tolist(), strict=True):
+                at = stamp or time
+                if stamps and at <= stamps[-1]:
+                    rejections.reject(VEHICLE, 'not strictly increasing', f'stamp {at} ns')
                     continue
-                stamp = sample[0] or received
-                if stamps and stamp <= stamps[-1]:
-                    rejections.reject(VEHICLE, 'not strictly increasing', f'stamp {stamp} ns')
-                    continue
-                stamps.append(stamp)
-                values.append(sample[1])
+                stamps.append(at)
+                values.append(row)
+
+        read_all(recording, [Subscription({topic: VEHICLE}, add)])
         missing = tuple(recording.missing)
     if not stamps:
         raise BagError(f'{path}: {topic}: no valid message' + (

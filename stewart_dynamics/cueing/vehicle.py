@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from functools import partial
 import itertools
 import math
 from typing import Any
@@ -14,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND
+from stewart_dynamics.messages.stamp_order import NO_STAMP
 from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE
 from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
-from stewart_dynamics.setpoints.rejections import jumped_back, Rejections
-from stewart_dynamics.setpoints.stamp_order import NO_STAMP, Order, order_of, reason_of
+from stewart_dynamics.setpoints.rejections import check_stamp, Rejections
 
 # Readings are judged by means of blocks, in which the noise of a sensor averages out.
 _BLOCK = 0.25  # [s]
@@ -196,7 +197,7 @@ class Vehicle:
 
     def take(self, data: bytes, now: float) -> None:
         """Take a message at a time [s]."""
-        read = self._reader.read(data)
+        read = self._reader.read_sample(data)
         if read is None or not self._in_order(read[0]):
             return
         rates, forces = read[1][:3], read[1][3:]
@@ -260,11 +261,9 @@ class Vehicle:
         """Return whether a reading is used; without a stamp it is used as it comes."""
         if stamp == NO_STAMP:
             return True
-        last, order = self._stamp or 0, order_of(stamp, self._stamp, self._timeout)
-        if order is Order.RESTART:
-            self._notice(f'vehicle: {jumped_back(last - stamp)}')
-        if order.used:
+        used = check_stamp(
+            stamp, self._stamp, self._timeout, partial(self._rejections.reject, VEHICLE),
+            lambda text: self._notice(f'vehicle: {text}'))
+        if used:
             self._stamp = stamp
-        else:
-            self._rejections.reject(VEHICLE, *reason_of(order, stamp, last))
-        return order.used
+        return used

@@ -26,12 +26,12 @@ from stewart_dynamics.mechanics.drives.measured_efforts import (
 from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, NO_BASE, TWIST, WRENCH
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
+from stewart_dynamics.messages.stamp_order import NO_STAMP
 from stewart_dynamics.parameters.table import MOTOR_CURRENTS, MOTOR_TORQUES, Parameters
 from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.rejections import (
-    BASE_NOT_KNOWN, jumped_back, MALFORMED, OUT_OF_RANGE, Rejection, stamp_words)
-from stewart_dynamics.setpoints.stamp_order import NO_STAMP, Order, order_of, reason_of
+    BASE_NOT_KNOWN, check_stamp, MALFORMED, OUT_OF_RANGE, Rejection, stamp_words)
 
 # A row: the stamp [ns, an integer], pose and twist as in a row of motion, the forces that acted
 # since the measurement before [N], the known load, the motion of the base.
@@ -190,7 +190,8 @@ class MeasuredLegs:
         """
         found = None
         for measurement in self._measurements(data):
-            if self._in_time(measurement.stamp):
+            if check_stamp(measurement.stamp, self._last and self._last.stamp, self._timeout,
+                           self._reject, self._notice_restart):
                 found = self._estimated(
                     self._of_motors.to_drives(measurement), known, target, base) or found
         return found
@@ -239,13 +240,5 @@ class MeasuredLegs:
                 (p[0] + z[0], p[1] + z[1], p[2] + z[2], p[3] + z[3], p[4] + z[4], p[5] + z[5]),
                 p[6:12], p[12:18])
 
-    def _in_time(self, stamp: int) -> bool:
-        """Return whether a measurement may still be used, or reject it."""
-        if self._last is None:
-            return True
-        order = order_of(stamp, self._last.stamp, self._timeout)
-        if order is Order.RESTART:
-            self._noticed(f'{MEASURED_LEGS}: {jumped_back(self._last.stamp - stamp)}')
-        elif not order.used:
-            self._reject(*reason_of(order, stamp, self._last.stamp))
-        return order.used
+    def _notice_restart(self, text: str) -> None:
+        self._noticed(f'{MEASURED_LEGS}: {text}')

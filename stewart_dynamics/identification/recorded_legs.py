@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND, Stamps
+from stewart_dynamics.bags.feed import feed_subscribers, Subscription
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.identification.windows import (
     FEWEST, period_of, segments, Signal, uniform, Window)
@@ -64,10 +66,11 @@ class RecordedLegs:
 
     def windows(self, progress: Callable[[int], None] | None = None) -> Iterator[Window]:
         """Yield the windows; report the bytes read to ``progress``."""
-        keys = {self._topics.legs: _LEGS} | ({} if self._one else {
-            self._topics.efforts: _EFFORTS})
-        for messages, size in self._recording.messages(keys):
-            self._take(messages)
+        topics = {_LEGS: self._topics.legs} | ({} if self._one else {
+            _EFFORTS: self._topics.efforts})
+        for size in feed_subscribers(self._recording, [
+                Subscription({topic: key}, partial(self._read_states, key))
+                for key, topic in topics.items()]):
             if progress is not None:
                 progress(size)
             while len(self._read[_LEGS].stamps) > _WINDOW and (
@@ -77,29 +80,28 @@ class RecordedLegs:
         for key, reader in self._readers.items():
             reader.check(f'{self._recording.path}: {getattr(self._topics, key)}')
 
-    def _take(self, messages: Messages) -> None:
-        for key, places in messages.places().items():
-            starts, sizes = messages.starts[places], messages.sizes[places]
-            if key not in self._readers:
-                self._readers[key] = self._reader(key, messages, starts[:1], sizes[:1])
-            stamps, values, rejected = self._readers[key].read_many(messages.data, starts, sizes)
-            sound = (np.abs(values) < NUMBERS_END).all(axis=1) & (stamps > 0)
-            self.rejected.update(rejected)
-            if not sound.all():
-                self.rejected['out of range or without a stamp'] += int(np.count_nonzero(~sound))
-            if key == _LEGS:
-                self.samples += int(np.count_nonzero(sound))
-            self._read[key] = _extended(
-                self._read[key], stamps[sound], values[sound], self.rejected)
+    def _read_states(self, key: str, messages: Messages) -> None:
+        if key not in self._readers:
+            self._readers[key] = self._reader(key, messages)
+        stamps, values, rejected = self._readers[key].read_many(
+            messages.data, messages.starts, messages.sizes)
+        sound = (np.abs(values) < NUMBERS_END).all(axis=1) & (stamps > 0)
+        self.rejected.update(rejected)
+        if not sound.all():
+            self.rejected['out of range or without a stamp'] += int(np.count_nonzero(~sound))
+        if key == _LEGS:
+            self.samples += int(np.count_nonzero(sound))
+        self._read[key] = _extended(
+            self._read[key], stamps[sound], values[sound], self.rejected)
 
-    def _reader(self, key: str, messages: Messages, starts: Stamps, sizes: Stamps,
-                ) -> JointStateReader:
+    def _reader(self, key: str, messages: Messages) -> JointStateReader:
         """Return the reader of a topic; the first message shows whether rates are recorded."""
         if key == _EFFORTS:
             return JointStateReader(self._joints, ['effort'])
         efforts = ['effort'] if self._one else []
         reader = JointStateReader(self._joints, ['position', 'velocity', *efforts])
-        self.rates = reader.reads_all(messages.data[starts[0]:starts[0] + sizes[0]].tobytes())
+        _, _, first = next(messages.each())
+        self.rates = reader.reads_all(first)
         return reader if self.rates else JointStateReader(self._joints, ['position', *efforts])
 
     def _released(self, last: bool) -> Iterator[Window]:

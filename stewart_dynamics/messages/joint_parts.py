@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from stewart_dynamics.arrays import NANOSECOND, SECOND
+from stewart_dynamics.messages.stamp_order import NO_STAMP, Order, order_of
 
 GAP = SECOND // 10
 """Default of the longest time between two samples of a joint [ns]."""
@@ -59,10 +60,11 @@ class JointParts:
         """
         last = max((self._series[joint][-1][0] for joint in joints if self._series[joint]),
                    default=None)
-        if last is not None and stamp <= last:
-            if last - stamp <= self._gap and stamp:
-                return Joined([], [])  # the same once more, or late
-            self._clear()  # time jumped back, or there are no stamps: the first one was repeated
+        order = order_of(stamp, last, self._gap)
+        if order is Order.RESTART or (order is not Order.FRESH and stamp == NO_STAMP):
+            self._clear()  # without stamps, the first one was repeated
+        elif not order.used:
+            return Joined([], [])
         count = len(joints)
         for n, joint in enumerate(joints):
             self._series[joint].append((stamp, tuple(values[n::count])))

@@ -154,7 +154,7 @@ class Written(NamedTuple):
 
 class SideBySide:
     """
-    Messages of some topics, side by side, with a stamp and numbers of one row. Not thread-safe.
+    Messages of some topics, side by side, with a stamp and numbers of one row.
 
     kinds: the kinds of messages, in the order in which they are published.
     width: numbers in a row.
@@ -176,11 +176,7 @@ class SideBySide:
             len(parts), np.array(parts, record('message_part')), len(kinds),
             np.array([kind[3:] for kind in kinds], record('message_condition')), width)
         self._write = function('write_messages').bound(*constants)
-        # A single row is copied to memory that stays: a third of the time of a call with any.
-        self._stamp, self._row = np.zeros(1, np.int64), np.zeros((1, width))
-        memory, self._numbers, self._of_one = self._memory(1)
-        self._write_one = function('write_messages').bound(
-            *constants, 1, self._stamp, self._row, *memory)
+        self._constants = constants
 
     def _memory(self, number: int) -> tuple[
             Sequence[NDArray[Any]], Integers, list[tuple[str, Flags, NDArray[np.void]]]]:
@@ -197,16 +193,34 @@ class SideBySide:
         """
         Return the topics that have a message, which rows have it (N,), and the messages (N,).
 
-        stamps (N,) [ns], rows (N, width). Those of a single row are valid until the next call.
+        stamps (N,) [ns], rows (N, width).
         """
-        if len(stamps) == 1:
-            numbers, found = self._numbers, self._of_one
-            self._stamp[:], self._row[:] = stamps, rows
-            self._write_one()
-        else:
-            memory, numbers, found = self._memory(len(stamps))
-            self._write(len(stamps), stamps, np.ascontiguousarray(rows), *memory)
+        memory, numbers, found = self._memory(len(stamps))
+        self._write(len(stamps), stamps, np.ascontiguousarray(rows), *memory)
         return [each for number, each in zip(numbers.tolist(), found, strict=True) if number]
+
+    def bound(self, stamp: Stamps, row: Array) -> Callable[[], dict[str, bytes]]:
+        """
+        Return a function that returns the messages of the numbers that an array has when called.
+
+        It takes a third of the time of ``write``. Not thread-safe.
+
+        stamp (1,) [ns], row (1, width): arrays that stay.
+        """
+        memory, numbers, _ = self._memory(1)
+        write = function('write_messages').bound(*self._constants, 1, stamp, row, *memory)
+        whole, having = memory[0].data, numbers.data
+        ends = np.cumsum([0, *(kind.itemsize for kind, *_ in (
+            self._entries.fields or {}).values())]).tolist()
+        parts = list(zip(self._topics, ends[:-1], ends[1:], strict=True))
+
+        def written() -> dict[str, bytes]:
+            write()
+            data = whole.tobytes()
+            return {topic: data[begin:end] for has, (topic, begin, end) in zip(
+                having, parts, strict=True) if has}
+
+        return written
 
 
 def at_any_byte(data: Bytes, size: int) -> NDArray[np.void]:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +37,11 @@ class Messages(NamedTuple):
         """Return some of the messages: a slice, or an index or a mask (M,)."""
         return self._replace(of_topic=self.of_topic[which], times=self.times[which],
                              starts=self.starts[which], sizes=self.sizes[which])
+
+    def selected(self, names: Container[str]) -> Messages:
+        """Return the messages of some topics."""
+        which = np.array([topic in names for topic in self.topics])[self.of_topic]
+        return self if which.all() else self.chosen(which)
 
     def compact(self) -> Messages:
         """Return the same messages with only their own bytes."""

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 import math
 import time
@@ -63,12 +63,15 @@ class _Models(NamedTuple):
     """Models that share one set of parameters."""
 
     step: Step
+    write_answer: Callable[[], dict[str, bytes]]  # the messages of the step's last answer
     external_wrench: ExternalWrench
     base_wrench: BaseWrench
 
     @classmethod
     def of(cls, parameters: Parameters) -> _Models:
-        return cls(Step(parameters), ExternalWrench(parameters), BaseWrench(parameters))
+        step = Step(parameters)
+        return cls(step, OutputMessages(parameters).bound_to(step), ExternalWrench(parameters),
+                   BaseWrench(parameters))
 
 
 class DynamicsNode(ManagedNode[Parameters]):
@@ -180,7 +183,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._heard[topic] = came
         self._rested = self._rested or came - self._handled > _REST
         if not self._exclusive or self._is_only_writer(topic):
-            setpoint = self._setpoints.take([(topic, data, self._ros_time)])
+            setpoint = self._setpoints.join_message(topic, data, self._ros_time)
             if len(setpoint.stamps):
                 self._waiting.append((setpoint, came))
                 if not self._gathering:
@@ -225,8 +228,7 @@ class DynamicsNode(ManagedNode[Parameters]):
                 self._setpoints.reject('setpoint', *reason)
             return
         publishers = self._topics.publishers
-        answered = {topic: messages.tobytes()
-                    for topic, _, messages in self._messages.of(outputs)}
+        answered = self._models.write_answer()
         for topic, message in answered.items():
             publishers[topic].publish(message)
         if self._simulated:
@@ -294,12 +296,12 @@ class DynamicsNode(ManagedNode[Parameters]):
             self._diagnostics.base.heard[topic] = now
             if self._exclusive and not self._is_only_writer(topic):
                 return
-            if self._setpoints.base.take(topic, data, self._ros_time):
+            if self._setpoints.base.join_message(topic, data, self._ros_time):
                 self._diagnostics.base.sampled(self._setpoints.base, now)
 
     def _on_wrench(self, data: bytes) -> None:
         if self._active:
-            self._setpoints.take([(WRENCH, data, self._ros_time)])
+            self._setpoints.join_message(WRENCH, data, self._ros_time)
 
     def _on_measured_legs(self, data: bytes) -> None:
         if not self._active:

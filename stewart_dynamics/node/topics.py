@@ -37,10 +37,10 @@ from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.input_messages import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
     SOURCES, TWIST, WRENCH)
+from stewart_dynamics.setpoints.input_stream import WAITING
 from stewart_dynamics.setpoints.output_messages import (
     DETERMINANT, LEG_STATES, LegTopics, MOTOR_STATES, MOTOR_TORQUES, MOTOR_TYPES, output_types,
     SERVO_PULSES, SERVO_TYPES, WARNING)
-from stewart_dynamics.setpoints.sample_joining import WAITING
 
 DIAGNOSTICS, MARKERS, PAYLOAD, TRAVEL = '/diagnostics', 'markers', 'payload', 'travel'
 TRAVEL_RATE = 10.0  # highest rate of TRAVEL [Hz]

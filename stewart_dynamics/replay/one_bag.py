@@ -22,6 +22,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.bags.csv_motion import CsvMotion
+from stewart_dynamics.bags.feed import feed_subscribers, Subscription
 from stewart_dynamics.bags.find import bytes_of, RESULT
 from stewart_dynamics.bags.recording import LISTED, listed, Recording
 from stewart_dynamics.errors import StewartError
@@ -101,10 +102,11 @@ def replay(
         with whole_folder(folder, options, before=before) as partial, ExitStack() as stack:
             run = _Run(recording, topics, parameters, options, partial, stack)
             run.notices += [*likely_mistakes(parameters), *notices]
-            for messages, size in recording.messages({name: key for key, name in topics.items()}):
-                answered = run.take(messages)
+            answered = 0
+            for size in feed_subscribers(recording, run.subscriptions()):
                 if progress is not None:
-                    progress(size, answered)
+                    progress(size, run.answered - answered)
+                answered = run.answered
             if options.measured_table is not None:
                 run.take_table(CsvMotion(options.measured_table, options.reading, None))
             run.end()
@@ -156,6 +158,7 @@ class _Run:
         self._recording, self._topics = recording, topics
         self._parameters, self._options = parameters, options
         self.notices: list[str] = []
+        self.answered = 0  # number of setpoints
         self._more = 0
         self._quasi_static = (
             parameters.setpoint.source == POSES_ALONE and options.cutoff is None)
@@ -204,19 +207,21 @@ class _Run:
                             [topic for topic in topics if topic not in (MEASURED, MEASURED_POSE)])
         stack.callback(self._files.abandon)
 
-    def take(self, messages: Messages) -> int:
-        """Process messages; return the number of setpoints answered."""
-        for key in (MEASURED, MEASURED_POSE):
-            if key in self._topics:
-                measured = messages.of_topic == messages.topics.index(key)
-                if measured.any():
-                    self._take_measured(messages.chosen(measured))
-                    messages = messages.chosen(~measured)
+    def subscriptions(self) -> list[Subscription]:
+        """Return the subscriptions: of each block the measured legs come first."""
+        measured, setpoints = ({name: key for key, name in self._topics.items()
+                                if (key in (MEASURED, MEASURED_POSE)) is wanted}
+                               for wanted in (True, False))
+        return [Subscription(measured, self._take_measured),
+                Subscription(setpoints, self._take_setpoints)]
+
+    def _take_setpoints(self, messages: Messages) -> None:
+        """Answer messages of setpoints, base and external wrench."""
         self._files.write_inputs(messages)
-        setpoints = self._setpoints.take(messages)
+        setpoints = self._setpoints.join_messages(messages)
         if self._differentiator is not None:
             setpoints = self._differentiator.add(setpoints)
-        return self._answer(setpoints)
+        self._answer(setpoints)
 
     def take_table(self, table: CsvMotion) -> None:
         """Process achieved poses of a table; with setpoints of a table they share a clock."""
@@ -327,10 +332,10 @@ class _Run:
         else:
             self._more += 1
 
-    def _answer(self, setpoints: Batch) -> int:
+    def _answer(self, setpoints: Batch) -> None:
         """Take the step for setpoints; write its outputs and add them to summary and report."""
         if not len(setpoints.stamps):
-            return 0
+            return
         outputs = self._step(setpoints, self._state)
         self._state = outputs.state
         for reason in unanswered(self._parameters, setpoints, outputs):
@@ -338,7 +343,7 @@ class _Run:
         if len(outputs.stamps) < len(setpoints.stamps):
             setpoints = setpoints.chosen(outputs.answered)
         if not len(setpoints.stamps):
-            return 0
+            return
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
         block = Answered(self._seconds(setpoints.stamps), setpoints, outputs,
@@ -357,7 +362,7 @@ class _Run:
             self._compared(self._comparison.add_setpoints(block.seconds, setpoints, outputs))
         if self._response is not None:
             self._response.add(setpoints)
-        return len(setpoints.stamps)
+        self.answered += len(setpoints.stamps)
 
     def _note_servos(self, block: Answered) -> None:
         """Count setpoints with an angle outside the points of its servo: they have no pulses."""

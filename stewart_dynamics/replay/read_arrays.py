@@ -14,12 +14,14 @@ from typing import NamedTuple, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND, Stamps
+from stewart_dynamics.bags.feed import read_all, Subscription
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.leg_columns import columns, data_frame
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import COMBINED, Parameters, POSES_ALONE, SEPARATE
 from stewart_dynamics.program import EULER, NODE, node_name
 from stewart_dynamics.replay.bag_topics import find_measured_legs, name_of
@@ -216,10 +218,13 @@ def read_legs(
     found: dict[str, list[tuple[Stamps, Array]]] = {field: [] for field in readers}
     with closing(Recording(Path(os.fspath(path)))) as recording:
         name = find_measured_legs(recording, node_name(node), topic)
-        for messages, _ in recording.messages({name: _LEGS}):
+
+        def add(messages: Messages) -> None:
             for field, reader in readers.items():
                 states = reader.read_many(messages.data, messages.starts, messages.sizes)
                 found[field].append((states.stamps, states.values))
+
+        read_all(recording, [Subscription({name: _LEGS}, add)])
         missing = tuple(recording.missing)
     stamps, rows = {}, {}
     for field, reader in readers.items():

@@ -13,11 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND, Stamps
+from stewart_dynamics.bags.feed import feed_subscribers, Subscription
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics
 from stewart_dynamics.replay.differentiate import differentiator
@@ -61,9 +63,13 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         topics = find_topics(recording, parameters, options)
         setpoints = Setpoints(parameters, lambda rejection, details: None, lambda text: None)
         setpoints.unknown_angles = recording.unknown_angles
-        for messages, size in recording.messages({name: key for key, name in topics.items()}):
-            batch = setpoints.take(messages)
+
+        def add(messages: Messages) -> None:
+            batch = setpoints.join_messages(messages)
             batches.append(batch if splines is None else splines.add(batch))
+
+        for size in feed_subscribers(recording, [
+                Subscription({name: key for key, name in topics.items()}, add)]):
             progress(size)
         setpoints.end('the bag ends')
         if splines is not None:

@@ -112,13 +112,9 @@ class RecordedResponse:
             np.concatenate(stamps)[sound], rows[sound], np.concatenate(times)[sound])
 
     def _take_poses(self, messages: Messages) -> None:
-        whole = self._poses.read_many(messages.data, messages.starts, messages.sizes)
-        if whole is not None:
-            self._measured.add(*whole, messages.times)
-            return
-        for _, time, data in messages.each():
-            if (one := self._poses.read(data)) is not None:
-                self._measured.add(np.array([one[0]]), np.array([one[1]]), np.array([time]))
+        poses = self._poses.read_samples(messages.data, messages.starts, messages.sizes)
+        if len(poses.stamps):
+            self._measured.add(poses.stamps, poses.values, messages.times[poses.places])
 
     def take_poses(self, stamps: Stamps, poses: Array) -> None:
         """Add achieved poses (N, 12) of a file, whose clock may be another one."""

@@ -109,7 +109,7 @@ class Consistency:
         self._frame = frame
         self._pending: list[tuple[Stamps, Array, Flags]] = []
         self._steps: Iterator[None] | None = None  # those that ``judge`` has not yet done
-        self.noted: list[tuple[int, Sequence[float], bool]] = []
+        self.noted: list[tuple[Any, Any, Any]] = []
         """Single samples for ``judge``: stamp [ns], row of motion, whether time jumped back."""
         self._held = 0
         self._due = _GATHERED
@@ -132,6 +132,13 @@ class Consistency:
             self._steps = None
         if len(self.noted) >= _GATHERED:
             self._steps = self._take_noted()
+
+    def note(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
+        """Add N samples as ``add`` does; a single one is left to ``judge``."""
+        if len(stamps) == 1:
+            self.noted.append((stamps[0], motions[0], restarts[0]))
+        else:
+            self.add(stamps, motions, restarts)
 
     def add(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
         """Add N samples: stamps [ns], rows of motion (N, MOTION), whether time jumped back."""

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Converts messages of an input topic to checked samples, one message at a time or in batches.
+Converts messages of an input topic to checked samples.
 
 A sample is a stamp and the message's numbers, with the quaternion of a pose replaced by the
 rotation matrix. Node and replay apply the same checks and get bit-identical samples.
@@ -12,9 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import math
-from struct import Struct
 import sys
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +22,6 @@ from stewart_dynamics.core.binding import CODES, function, record, Sample
 from stewart_dynamics.mechanics.frames.rotation import quaternion_length
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError, Stamped
-from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist
 from stewart_dynamics.parameters import table
 from stewart_dynamics.parameters.table import Parameters
@@ -81,197 +79,160 @@ _COVARIANCES = {16: 'angular_velocity_covariance', 28: 'linear_acceleration_cova
 LARGEST = 1e9
 
 
+class MessageLayout(NamedTuple):
+    """Arguments of ``put_layout`` in core/library.h: they describe the messages of one layout."""
+
+    size: int  # [bytes]
+    message: Bytes  # one of them
+    fixed: Bytes  # 255 for bytes that are the same in all of them
+    n_parts: int
+    parts: Any
+    quaternion: int  # its offset, or -1
+    n_measured: int
+    measured: Integers  # offsets of covariances that are not -1
+    largest: float
+
+
 class TopicSamples(NamedTuple):
-    """New samples of a topic, N of them."""
+    """Valid messages of a topic, N of them."""
 
     stamps: Stamps  # (N,) [ns]
-    values: Array  # (N, ...)
-    places: Integers  # (N,): index of each message in the order of all messages
+    values: Array  # (N, width)
+    places: Integers  # (N,): index of each message
 
 
 class SampleReader:
     """
-    Reads the messages of one topic.
+    Reads the messages of one topic, and rejects those that are not valid.
 
-    Messages with the layout of the first valid one are read by that layout, which is faster.
+    Messages with a layout that was learned from a valid one are read by it, in C.
 
-    topic: one of ``input_topics``.
+    topic: one of ``INPUT_TYPES``.
     frame: required frame_id; an empty one is accepted. None: the first non-empty one is required.
+    width: numbers of a sample.
     """
 
     def __init__(self, topic: str, frame: str | None, rejections: Rejections) -> None:
-        self._topic = topic
+        self.topic = topic
         self._reader = _READERS[topic]
         self._has_pose, self._bounded = topic in _WITH_POSE, topic in _BOUNDED
+        self.width = 24 if topic == COMBINED else 12 if self._has_pose else 6
         self._frame = None if frame is None else frame.encode()
         self._rejections = rejections
         self._turned = Sample('one_rotation', 'quaternion', 'rotation')
         self._turn = function('stewart_rotation').bound(
             self._turned['quaternion'], self._turned['rotation'])
-        self._regular: _RegularMessages | None = None
-        self._frame_of_layout = b''
+        self._count = 0  # valid messages that were read field by field
+        self._new: bytes | None = None  # the last one, if its layout is to be learned
+        self._layout: MessageLayout | None = None
 
-    def read(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
-        """Return a message's stamp [ns] and values, or reject it."""
-        if self._regular is not None and (sample := self._regular.read(data)) is not None:
-            return sample
+    def read_fields(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
+        """Return a message's stamp [ns] and values, read field by field, or reject it."""
         try:
             stamp, frame, values = self._reader(data)
         except MalformedError as exc:
-            self._rejections.reject(self._topic, MALFORMED, str(exc))
+            self._rejections.reject(self.topic, MALFORMED, str(exc))
             return None
-        if self._is_other(frame):
-            self._rejections.reject(
-                self._topic, WRONG_FRAME, frame_details(frame, self._frame or b''))
+        if frame and self._frame is not None and frame != self._frame:
+            self._rejections.reject(self.topic, WRONG_FRAME, frame_details(frame, self._frame))
             return None
-        if self._topic in _IMUS:
+        if self.topic in _IMUS:
             for at, name in _COVARIANCES.items():
                 if values[at] == -1.0:
-                    self._rejections.reject(self._topic, NOT_MEASURED, f'{name}[0] is -1')
+                    self._rejections.reject(self.topic, NOT_MEASURED, f'{name}[0] is -1')
                     return None
             values = tuple([values[at] for at in _OF_IMU])
         if not all(map(math.isfinite, values)):
-            self._rejections.reject(self._topic, NOT_FINITE, str(values))
+            self._rejections.reject(self.topic, NOT_FINITE, str(values))
             return None
         if self._bounded and max(map(abs, values)) > LARGEST:
             self._rejections.reject(
-                self._topic, OUT_OF_RANGE, f'{values}: must be at most {LARGEST:g}')
+                self.topic, OUT_OF_RANGE, f'{values}: must be at most {LARGEST:g}')
             return None
         if self._has_pose:
             self._turned.write(*values[3:7])
             if self._turn() != CODES['STEWART_OK']:
                 self._rejections.reject(
-                    self._topic, NOT_UNIT, unit_rule(quaternion_length(*values[3:7])))
+                    self.topic, NOT_UNIT, unit_rule(quaternion_length(*values[3:7])))
                 return None
             values = values[:3] + self._turned.read() + values[7:]
-        if self._regular is None:
-            self._learn(data, frame)
-        self._keep_frame(frame)
-        return stamp, values
-
-    def read_many(self, data: Bytes, starts: Integers, sizes: Integers,
-                  ) -> tuple[Stamps, Array] | None:
-        """
-        Return stamps (N,) [ns] and values (N, ...) of messages that are all valid.
-
-        None if one is invalid or has another layout: then read them one by one.
-
-        data (M,): bytes that contain all messages.
-        starts, sizes (N,): offset and length of each message in bytes; N >= 1.
-        """
-        if self._regular is None:
-            first = data[starts[0]:starts[0] + sizes[0]].tobytes()
-            try:
-                frame = self._reader(first).frame
-            except MalformedError:
-                return None
-            if self._is_other(frame):
-                return None
-            self._learn(first, frame)
-        assert self._regular is not None
-        samples = self._regular.read_many(data, starts, sizes)
-        if samples is not None:
-            self._keep_frame(self._frame_of_layout)
-        return samples
-
-    def forget_layout(self) -> None:
-        """Learn the layout again, from the next valid message."""
-        self._regular = None
-
-    def _learn(self, data: bytes, frame: bytes) -> None:
-        self._regular, self._frame_of_layout = _RegularMessages(
-            layout_of(self._reader, data), self._topic), frame
-
-    def _keep_frame(self, frame: bytes) -> None:
-        """Require the frame of this valid message from now on, if no frame was specified."""
         if self._frame is None:
             self._frame = frame or None
+        self._count += 1
+        # The first one, and ever more rarely later ones: layouts may take turns.
+        self._new = data if self._count & (self._count - 1) == 0 else None
+        return stamp, values
 
-    def _is_other(self, frame: bytes) -> bool:
-        """Return whether a message has a wrong frame."""
-        return bool(frame) and self._frame is not None and frame != self._frame
-
-
-class _RegularMessages:
-    """
-    Reads valid messages of one layout, a tenth of the time of reading them field by field.
-
-    A single message is copied to memory that stays, and so is its sample.
-    """
-
-    def __init__(self, layout: Layout, topic: str) -> None:
+    def new_layout(self) -> MessageLayout | None:
+        """Return the layout of the last message, if it is to be learned."""
+        if self._new is None:
+            return None
+        layout = layout_of(self._reader, self._new)
+        self._new = None
         (at, count), *others = layout.numbers
         quaternion, measured = -1, []
-        if topic in _IMUS:
-            width, parts = 6, [(at + 8 * _OF_IMU[0], 0, 3), (at + 8 * _OF_IMU[3], 3, 3)]
+        if self.topic in _IMUS:
+            parts = [(at + 8 * _OF_IMU[0], 0, 3), (at + 8 * _OF_IMU[3], 3, 3)]
             measured = [at + 8 * place for place in _COVARIANCES]
-        elif topic in _WITH_POSE:
-            width, quaternion = 12 + 6 * len(others), at + 24
+        elif self._has_pose:
+            quaternion = at + 24
             parts = [(at, 0, 3), *((start, 12 + 6 * n, size)
                                    for n, (start, size) in enumerate(others))]
         else:
-            width, parts = count, [(at, 0, count)]
-        self._size, self._width = layout.size, width
-        constants = (
+            parts = [(at, 0, count)]
+        return MessageLayout(
             layout.size, np.frombuffer(layout.message, np.uint8), layout.fixed, len(parts),
             np.array(parts, record('message_part')), quaternion, len(measured),
-            np.array(measured, np.int64), LARGEST if topic in _BOUNDED else sys.float_info.max,
-            width)
-        self._read = function('read_messages').bound(*constants)
-        data, sample = np.zeros(layout.size, np.uint8), np.zeros(1 + width, np.int64)
-        self._read_one = function('read_messages').bound(
-            *constants, 1, data, np.zeros(1, np.int64), np.array([layout.size]), sample[:1],
-            sample[1:].view(float))
-        self._data, self._sample = data.data, sample.data
-        self._numbers = Struct(f'q{width}d')
+            np.array(measured, np.int64), LARGEST if self._bounded else sys.float_info.max)
 
-    def read(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
-        """Return stamp [ns] and numbers of a message; None if it is another or not valid."""
-        if len(data) != self._size:
-            return None
-        self._data[:] = data
-        if not self._read_one():
-            return None
-        sample = self._numbers.unpack(self._sample)
-        return sample[0], sample[1:]
+    def read_samples(self, data: Bytes, starts: Integers, sizes: Integers) -> TopicSamples:
+        """
+        Return the samples of messages that are valid; reject the others.
 
-    def read_many(self, data: Bytes, starts: Integers, sizes: Integers,
-                  ) -> tuple[Stamps, Array] | None:
-        """Return stamps (N,) and numbers (N, ...); None if one is another or not valid."""
-        stamps, values = np.empty(len(starts), np.int64), np.empty((len(starts), self._width))
-        number = self._read(len(starts), data, np.ascontiguousarray(starts),
-                            np.ascontiguousarray(sizes), stamps, values)
-        return (stamps, values) if number == len(starts) else None
+        data (M,): bytes that contain all messages.
+        starts, sizes (N,): offset and length of each message in bytes.
+        """
+        count = len(starts)
+        stamps, values = np.empty(count, np.int64), np.empty((count, self.width))
+        valid = np.ones(count, dtype=bool)
+        n = 0
+        while n < count:
+            if self._layout is not None:
+                n += function('read_messages')(
+                    *self._layout, self.width, count - n, data,
+                    np.ascontiguousarray(starts[n:]), np.ascontiguousarray(sizes[n:]),
+                    stamps[n:], values[n:])
+            if n < count:
+                sample = self.read_fields(data[starts[n]:starts[n] + sizes[n]].tobytes())
+                if sample is None:
+                    valid[n] = False
+                else:
+                    stamps[n], values[n] = sample
+                self._layout = self.new_layout() or self._layout
+                n += 1
+        places = np.flatnonzero(valid)
+        return TopicSamples(stamps[places], values[places], places)
+
+    def read_sample(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
+        """Return a message's stamp [ns] and values, or reject it."""
+        samples = self.read_samples(
+            np.frombuffer(data, np.uint8), np.zeros(1, np.int64), np.array([len(data)]))
+        if not len(samples.stamps):
+            return None
+        return int(samples.stamps[0]), tuple(samples.values[0].tolist())
 
 
 class WrenchInput:
-    """Follows ``~/wrench``."""
+    """Follows the ``~/wrench`` of the simulator."""
 
     def __init__(self, parameters: Parameters, rejections: Rejections) -> None:
         self.wrench: Six = NO_WRENCH
         """Force and moment at the platform's origin, base axes [N, N m]."""
-        self.reader = SampleReader(WRENCH, parameters.base_frame, rejections)
+        self._reader = SampleReader(WRENCH, parameters.base_frame, rejections)
 
-    def take(self, data: bytes) -> None:
+    def use_message(self, data: bytes) -> None:
         """Use the wrench of this geometry_msgs/WrenchStamped from now on, if it is valid."""
-        sample = self.reader.read(data)
+        sample = self._reader.read_sample(data)
         if sample is not None:
             fx, fy, fz, tx, ty, tz = sample[1]
             self.wrench = fx, fy, fz, tx, ty, tz
-
-    def at(self, samples: TopicSamples, places: Integers) -> Array:
-        """
-        Use new wrenches in order, and return the one that is valid at each of the given indices.
-
-        samples: read by ``reader``.
-        places (K,): indices in the order of all messages.
-        Returns (K, 6) [N, N m].
-        """
-        wrenches = np.empty((len(places), 6))
-        wrenches[:] = self.wrench
-        if len(samples.values):
-            latest = np.searchsorted(samples.places, places) - 1
-            wrenches[latest >= 0] = samples.values[latest[latest >= 0]]
-            fx, fy, fz, tx, ty, tz = samples.values[-1].tolist()
-            self.wrench = fx, fy, fz, tx, ty, tz
-        return wrenches

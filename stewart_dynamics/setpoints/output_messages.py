@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.step import (
     CHANGED, FINITE_MOTORS, MOTOR_ANGLES, MOTOR_COMMANDS, MOTOR_SPEEDS, OUTPUT, Outputs, POSITIONS,
-    WARNING_STATE)
+    Step, WARNING_STATE)
 
 LEG_STATES, DETERMINANT, WARNING = (
     'leg_states', 'jacobian_determinant', 'singularity_warning')
@@ -71,7 +71,7 @@ SERVO_TYPES = {SERVO_PULSES: type_names.FLOAT64_MULTI_ARRAY}
 
 class OutputMessages:
     """
-    Writes the output messages; not thread-safe, as the step.
+    Writes the output messages.
 
     types: topics that the hexapod has, and their types.
     """
@@ -114,6 +114,14 @@ class OutputMessages:
         messages = self._of_outputs.write(outputs.stamps, outputs.rows)
         return messages if self._pulses is None else messages + self._pulses.of(outputs)
 
+    def bound_to(self, step: Step) -> Callable[[], dict[str, bytes]]:
+        """Return a function that returns the messages of the last single setpoint of a step."""
+        write = self._of_outputs.bound(*step.last_one)
+        if self._pulses is None:
+            return write
+        write_pulses = self._pulses.bound_to(step)
+        return lambda: write() | write_pulses()
+
     def of_wrench(self, stamp: int, wrench: Sequence[float]) -> bytes:
         """Return the geometry_msgs/WrenchStamped of a wrench in base axes."""
         return self._wrench.write(stamp, wrench)
@@ -134,7 +142,7 @@ class _ServoPulses:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
+        self._parameters, self._kind = parameters, parameters.leg_kind
         self._writer = SideBySide(
             [Written(SERVO_PULSES, FLOAT64_ARRAY, [slice(0, 6)], known=0)], 6)
 
@@ -143,6 +151,20 @@ class _ServoPulses:
         pulses, _ = pulse_rows(self._parameters, outputs.drive_positions)
         pulses[~outputs.with_efforts] = np.nan
         return self._writer.write(outputs.stamps, pulses)
+
+    def bound_to(self, step: Step) -> Callable[[], dict[str, bytes]]:
+        """Return the same as ``OutputMessages.bound_to``."""
+        stamp, row = step.last_one
+        positions, effort = self._kind.position.columns, self._kind.published.start
+        pulses = np.empty((1, 6))
+        write = self._writer.bound(stamp, pulses)
+
+        def written() -> dict[str, bytes]:
+            pulses[:] = (np.nan if np.isnan(row[0, effort])
+                         else pulse_rows(self._parameters, row[:, positions])[0])
+            return write()
+
+        return written
 
 
 def motor_states_writer(parameters: Parameters) -> JointStateWriter | None:

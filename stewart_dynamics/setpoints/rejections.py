@@ -12,10 +12,12 @@ from typing import NamedTuple
 
 from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.messages.cdr import MALFORMED, NOT_FINITE
+from stewart_dynamics.messages.stamp_order import Order, order_of
 
-__all__ = ['BASE_NOT_KNOWN', 'DROPPED', 'frame_details', 'MALFORMED', 'NOT_EXCLUSIVE',
-           'NOT_FINITE', 'NOT_JOINED', 'NOT_MEASURED', 'NOT_UNIT', 'OUT_OF_RANGE', 'OUT_OF_REACH',
-           'Rejection', 'Rejections', 'STAMP_ZERO', 'TOO_OLD', 'TWICE', 'WRONG_FRAME']
+__all__ = ['BASE_NOT_KNOWN', 'check_stamp', 'DROPPED', 'frame_details', 'MALFORMED',
+           'NOT_EXCLUSIVE', 'NOT_FINITE', 'NOT_JOINED', 'NOT_MEASURED', 'NOT_UNIT', 'OUT_OF_RANGE',
+           'OUT_OF_REACH', 'Rejection', 'Rejections', 'STAMP_ZERO', 'TOO_OLD', 'TWICE',
+           'WRONG_FRAME']
 
 BASE_NOT_KNOWN = "the base's motion is not known"
 NOT_UNIT = 'quaternion not of unit length'
@@ -71,6 +73,26 @@ def too_old(stamp: int, back: int) -> str:
 def jumped_back(back: int) -> str:
     """Return the notice of a restart by a time [ns]."""
     return f'stamps jumped back by {back / SECOND:g} s: followed as a restart'
+
+
+def check_stamp(stamp: int, last: int | None, timeout: int, reject: Callable[[str, str], object],
+                noticed: Callable[[str], object]) -> bool:
+    """
+    Return whether a sample is used by its stamp; report a restart, or the rejection.
+
+    stamp, last, timeout: those of ``order_of`` [ns].
+    reject: called with reason and details. noticed: called with a text for the log.
+    """
+    order = order_of(stamp, last, timeout)
+    if order is Order.TWICE:
+        reject(TWICE, stamp_words(stamp))
+    elif last is not None and order is not Order.FRESH:
+        back = last - stamp
+        if order is Order.RESTART:
+            noticed(jumped_back(back))
+        else:
+            reject(TOO_OLD, too_old(stamp, back))
+    return order.used
 
 
 class Rejections:

@@ -343,6 +343,8 @@ class Step:
         self._memory: tuple[Any, ...] = (
             np.zeros(1, np.int64), np.zeros((1, SETPOINT)), FIRST.copy(), np.empty((1, OUTPUT)))
         self._step_one = function('step_setpoints').bound(hexapod, 0, 1, *self._memory)
+        self.last_one: tuple[Stamps, Array] = self._memory[0], self._memory[-1]
+        """Memory that has stamp (1,) and row (1, OUTPUT) of the last call for a single one."""
 
     def __call__(self, setpoints: Batch, before: Array = FIRST) -> Outputs:
         """

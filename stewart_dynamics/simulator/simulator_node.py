@@ -113,7 +113,7 @@ class SimulatorNode(Node):
                 event_callbacks=for_late_subscribers(self, partial(self._publish_again, topic)))
             for topic, kind in self._output_types().items()}
         inputs: dict[str, Callable[[bytes], None]] = {
-            'commands': self._on_commands, 'wrench': self._wrench_input.take}
+            'commands': self._on_commands, 'wrench': self._wrench_input.use_message}
         if isinstance(self._base, BaseOfTopics):
             inputs.update({topic: partial(self._on_base, self._base, topic)
                            for topic in BASE_TYPES})
@@ -174,7 +174,7 @@ class SimulatorNode(Node):
             self._advance()
 
     def _on_base(self, base: BaseOfTopics, topic: str, data: bytes) -> None:
-        base.input.take(topic, data, lambda: self._periods.stamp_of(self._index))
+        base.input.join_message(topic, data, lambda: self._periods.stamp_of(self._index))
 
     def _on_time(self) -> None:
         """Take the periods that are due."""

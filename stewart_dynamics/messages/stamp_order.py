@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The order of stamps: the same rule for setpoints, base, measured legs and vehicle."""
+"""The order of stamps: the same rule for setpoints, base, measured legs, parts, and vehicle."""
 
 from __future__ import annotations
 
 from enum import Enum
 
-from stewart_dynamics.setpoints.rejections import stamp_words, TOO_OLD, too_old, TWICE
+from stewart_dynamics.core.binding import CODES, function
 
 NO_STAMP = 0
 """A stamp of zero is no time, whatever came before: the message has no stamp."""
@@ -34,15 +34,7 @@ def order_of(stamp: int, last: int | None, timeout: int) -> Order:
     stamp, last: [ns], not NO_STAMP; None before the first.
     timeout: longest time by which messages are late [ns]; a longer jump back is a restart.
     """
-    if last is None or stamp > last:
-        return Order.FRESH
-    if stamp == last:
-        return Order.TWICE
-    return Order.TOO_OLD if last - stamp <= timeout else Order.RESTART
+    return _ORDERS[function('stamp_order')(stamp, last is not None, last or 0, timeout)]
 
 
-def reason_of(order: Order, stamp: int, last: int) -> tuple[str, str]:
-    """Return reason and details of the rejection of a stamp that is not used."""
-    if order is Order.TWICE:
-        return TWICE, stamp_words(stamp)
-    return TOO_OLD, too_old(stamp, last - stamp)
+_ORDERS = {CODES[f'STAMP_{order.name}']: order for order in Order}
