@@ -159,7 +159,7 @@ def _renamed(bag: dict[str, Any], noise: tuple[str, str]) -> dict[str, Any]:
 
 
 def _base_parameters(found: Identified, sure: bool) -> dict[str, Any]:
-    """Return estimates of ``LegKind.base_parameters``, if these legs have any."""
+    """Return estimates of ``LegKind.base_parameters`` that are uncertain, if there are any."""
     u, p, fit = found.unknowns, found.parameters, found.fit
     estimates: list[dict[str, Any]] = []
     for each in p.leg_kind.base_parameters(p):
@@ -168,6 +168,8 @@ def _base_parameters(found: Identified, sure: bool) -> dict[str, Any]:
             for name, coefficients in each.terms.items():
                 sums[u.names.index(f'{name}.{joint}')] = coefficients[leg]
             before = float(np.linalg.norm(sums @ u.root))
+            if not before:
+                continue  # the file knows it exactly
             shifts = 0.0 if found.lack_of_fit is None else float(
                 np.abs(sums) @ found.lack_of_fit.shifts) / TWO_SIDED
             error = math.sqrt(max(float(sums @ fit.covariance @ sums), 0.0)) + shifts
