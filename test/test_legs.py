@@ -22,9 +22,6 @@ from stewart_dynamics.calibration.pose_design import design_poses
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.export.drive_files import drive_files
 from stewart_dynamics.export.linuxcnc import hal_lines
-from stewart_dynamics.identification.identification_options import IdentificationOptions
-from stewart_dynamics.identification.identify import Identification
-from stewart_dynamics.identification.motion_design import design, DesignOptions
 from stewart_dynamics.legs import CRANK, require_kind, TELESCOPIC
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.planned.trajectory_messages import answer, NOT_AVAILABLE
@@ -41,7 +38,6 @@ PROGRAMS = {
     'stewart_calibrate poses.csv': 'calibration', 'stewart_calibrate --design 20': 'calibration',
     'stewart_cueing_report vehicle.csv': 'motion cueing',
     'stewart_export --fmu --drives': '--drives', 'stewart_export --linuxcnc': '--linuxcnc',
-    'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification',
     'stewart_replay bag --response --measured /legs': 'responses'}
 NODES = {
     f'stewart_cueing --ros-args --params-file {CRANK_FILE}': 'motion cueing',
@@ -95,9 +91,6 @@ CALLS: dict[str, Callable[[StewartPlatform], object]] = {
     'calibration': lambda platform: calibrate(
         platform, np.zeros((20, 6)), Pose(np.zeros((20, 3)), [np.eye(3)] * 20)),
     'calibration ': lambda platform: design_poses(platform, 20),
-    'identification': lambda platform: Identification(
-        platform.parameters, IdentificationOptions()),
-    'identification ': lambda platform: design(platform.parameters, DesignOptions()),
     '--drives': lambda platform: drive_files(platform.parameters, 'rig'),
     '--linuxcnc': lambda platform: hal_lines(platform.parameters),
     'responses': responses,
