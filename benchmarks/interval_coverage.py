@@ -37,6 +37,7 @@ from recorded import Noise  # noqa: E402, I202
 from referees import rng  # noqa: E402, I202
 
 BEGIN, END = '<!-- coverage: begin -->', '<!-- coverage: end -->'
+BEGIN_CRANKS, END_CRANKS = ('<!-- coverage of cranks: begin -->', '<!-- coverage of cranks: end -->')
 BEGIN_TABLE, END_TABLE = '<!-- estimates: begin -->', '<!-- estimates: end -->'
 PAYLOAD = 'payload: '
 # Motions of the payload service.
@@ -342,7 +343,8 @@ def main() -> None:
     lines += [measured_on(), '']
     print('\n'.join(lines))
     if options.write:
-        write(lines, *((BEGIN_TABLE, END_TABLE) if options.table else (BEGIN, END)))
+        write(lines, *((BEGIN_TABLE, END_TABLE) if options.table else (BEGIN, END)
+                       if options.legs == 'telescopic' else (BEGIN_CRANKS, END_CRANKS)))
 
 
 if __name__ == '__main__':
