@@ -83,8 +83,8 @@ def main() -> None:
             'from sweeps at once.'), '']
     lines += [(
         f'{asked.duration:.0f} s up to {asked.frequency:g} Hz, efforts at {asked.rate:g} Hz with '
-        f'white noise of {noise_of(asked, file):g} N. A design takes {took:.0f} s of processor time, seed '
-        f'{asked.seed}.'), '', (
+        f'white noise of {noise_of(asked, file):g} N. A design takes {took:.0f} s of processor '
+        f'time, seed {asked.seed}.'), '', (
         f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
         f'{platform.python_version()}.'), '']
     print('\n'.join(lines))

@@ -6,8 +6,8 @@ Study of how often the intervals of stewart_identify and of the payload contain 
 
 True hexapods are drawn from the uncertainty of the parameter file, legs, gain, reflected masses
 and tilt included, see ``test/estimate_cases.py``, with telescopic legs or, ``--legs crank``, with
-cranks. ``--table`` shows the answers to recordings that are poor, or in conflict with the file. Run by hand, ``make bench-coverage``; see README.md
-in this folder.
+cranks. ``--table`` shows the answers to recordings that are poor, or in conflict with the file.
+Run by hand, ``make bench-coverage``; see README.md in this folder.
 """
 
 from __future__ import annotations
