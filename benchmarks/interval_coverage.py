@@ -37,7 +37,8 @@ from recorded import Noise  # noqa: E402, I202
 from referees import rng  # noqa: E402, I202
 
 BEGIN, END = '<!-- coverage: begin -->', '<!-- coverage: end -->'
-BEGIN_CRANKS, END_CRANKS = ('<!-- coverage of cranks: begin -->', '<!-- coverage of cranks: end -->')
+BEGIN_CRANKS, END_CRANKS = (
+    '<!-- coverage of cranks: begin -->', '<!-- coverage of cranks: end -->')
 BEGIN_TABLE, END_TABLE = '<!-- estimates: begin -->', '<!-- estimates: end -->'
 PAYLOAD = 'payload: '
 # Motions of the payload service.
@@ -46,7 +47,7 @@ GROUPS = {'mass': 'platform.mass', **{f'center {axis}': f'platform.center_of_mas
                                       for axis in 'xyz'},
           'inertia': 'platform.inertia', 'viscous': 'actuator.viscous_friction',
           'Coulomb': 'actuator.coulomb_friction'}
-# Of cranks, beside these; motions with few samples a second, of which there are 200.
+# Further columns for cranks, and sampling rates: 200 recordings of cranks have few samples.
 OF_CRANKS = {'rotors': 'actuator.reflected_inertia', 'moments': 'legs.crank.first_moment',
              'K1': 'legs.crank.shaft_inertia', 'K2': 'legs.crank.shaft_moment.e',
              'm_c y_c': 'legs.crank.shaft_moment.n', 'm_ab': 'legs.rod.coupling_mass'}

@@ -172,7 +172,7 @@ def by_newton_euler(machine: CrankHexapod, motion: Motion) -> tuple[Array, Array
 
 
 def test_identified_numbers_give_the_torques_of_free_bodies() -> None:
-    """Of another motion than the recorded one; the file has other cranks, rotors and rods."""
+    """The motion is not the recorded one; the file has other cranks, rotors and rods."""
     machine, path = on_rig()
     angles, rates, torques = by_newton_euler(machine, path(np.arange(1200) / RATE))
     p = parameters_of(replace(machine, mc=1.3 * machine.mc, mr=0.9 * machine.mr,
@@ -343,7 +343,7 @@ def test_likely_mistakes_are_named_and_nothing_is_written(
 
 
 def test_a_horn_on_the_next_tooth_is_the_cause_of_the_lack_of_fit() -> None:
-    """Of 25: 14.4 degrees, found from torques though no pose was measured."""
+    """14.4 degrees with 25 teeth, found from torques though no pose was measured."""
     given = recorded_of(Truth(CRANKS), 'rich', 5, SENSORS, 12.0, RATE)
     turned = np.radians(14.4) * (np.arange(6) == 3)
     found = found_in(given._replace(positions=given.positions + turned), CRANKS, 'platform',
@@ -369,7 +369,7 @@ def test_rotors_far_from_the_file_are_the_cause_of_the_lack_of_fit() -> None:
 
 @pytest.mark.parametrize('seed', range(3))
 def test_intervals_contain_hexapods_that_are_drawn(seed: int) -> None:
-    """Of 200 of them: benchmarks/interval_coverage.py --legs crank."""
+    """See benchmarks/interval_coverage.py --legs crank for 200 of them."""
     found: Outcome = judged([recorded_of(drawn(seed, CRANKS), 'rich', seed, rate=RATE)],
                             drawn(seed, CRANKS), rate=RATE, hold_out=0.0, kinds=ALL)
     assert np.mean([each.holds for each in found.intervals]) > 0.8
@@ -408,7 +408,8 @@ def test_a_motion_is_designed_within_the_limits(
                  'platform,friction,reflected_inertia']) == 0
     out, _ = capsys.readouterr()
     lines = out.splitlines()
-    assert lines[0] == 'predicted 95 % intervals: 8 s, white noise of 0.482 N m in efforts at 500 Hz'
+    assert lines[0] == ('predicted 95 % intervals: 8 s, white noise of 0.482 N m in efforts at '
+                        '500 Hz')
     half, unit = next(line.split()[2:4] for line in lines if 'reflected_inertia' in line)
     assert unit == 'kg' and 0.0 < float(half) < 0.5 * 1.96 * 0.1 * 0.3
     assert re.search(r'use of the range .* of limits\.', lines[-3])

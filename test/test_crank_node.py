@@ -16,7 +16,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from estimate_cases import CASES, rich  # noqa: E402
+from estimate_cases import CASES, rich  # noqa: E402, I100
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from referees import rng  # noqa: E402
 from running import (  # noqa: E402
@@ -335,7 +335,7 @@ def test_travel_is_published(node: DynamicsNode) -> None:
 
 
 def test_the_payload_on_cranks_is_identified_by_a_service(start: Start) -> None:
-    """Of measured angles, speeds and torques, as by the library."""
+    """Measured angles, speeds and torques give the answer of the library."""
     node = start('setpoint.timeout:=60.0', file=CRANKS)
     node.until_active()
     loaded = StewartPlatform(PLATFORM.parameters.replaced({

@@ -182,7 +182,7 @@ class Extraction:
         self._losses = of_motors and has_losses(platform.parameters)
         self._coulomb_velocity = platform.parameters.actuator.coulomb_velocity
         parameters = platform.parameters
-        # Of a movement of the drives: by it, a platform joint moves by the size of the platform.
+        # Movement of the drives by which a platform joint moves by the size of the platform.
         self._size = float(parameters.singularity.characteristic_length / np.mean(
             parameters.leg_kind.reach(parameters)))
         self._wide = LowPass.of(period, WIDE * cutoff, _TRANSITION * cutoff)

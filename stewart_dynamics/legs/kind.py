@@ -174,7 +174,7 @@ class LegKind(ABC):
     weights : tuple of str
         Names of masses that show by how much the masses of the legs differ from a file.
     zero_cause : ZeroCause
-        What a wrong zero of the measured positions is.
+        The cause of a lack of fit that a wrong zero of the measured positions is.
     massless : mapping
         Values of parameters with which the legs and the drives have no mass.
     solids : tuple of Solid

@@ -101,8 +101,8 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
     Return the values of theta under the names of a parameter file, offsets left out.
 
     theta (n,): parameters of a hexapod, SI units.
-    p: source of the payload, and of what these do not contain: the center of mass of each part of
-        a leg without mass.
+    p: source of the payload, and of numbers that theta does not contain, such as the center of
+        mass of each part of a leg without mass.
     Raises ParameterError: no body has these parameters: a mass is not positive, or a part of a leg
         has moments without mass or a negative inertia about its center of mass.
     """
