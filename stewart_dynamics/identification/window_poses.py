@@ -72,12 +72,13 @@ def motions(platform: StewartPlatform, poses: Pose, rates: Array, accelerations:
     """
     Return rows of motion (N, MOTION) for poses, rates and accelerations of positions (N, 6).
 
-    ``J_inv X' = L'`` and ``J_inv X'' = L'' - J_inv' X'``; of cranks J_q and their angles.
+    ``J X' = q'`` and ``J X'' = q'' - J' X'`` with J = ``position_jacobian``, q lengths or angles.
     """
     rows = np.zeros((len(poses.rows), MOTION))
     rows[:, POSE] = poses.rows[:, POSE]
-    j_inv = platform.position_jacobian(poses)
-    rows[:, TWIST] = np.linalg.solve(j_inv, rates[..., None])[..., 0]
+    jacobian = platform.position_jacobian(poses)
+    rows[:, TWIST] = np.linalg.solve(jacobian, rates[..., None])[..., 0]
     drift = platform.position_jacobian_rate(Motion.of_rows(rows)) @ rows[:, TWIST, None]
-    rows[:, ACCELERATION] = np.linalg.solve(j_inv, accelerations[..., None] - drift)[..., 0]
+    rows[:, ACCELERATION] = np.linalg.solve(
+        jacobian, accelerations[..., None] - drift)[..., 0]
     return rows
