@@ -20,7 +20,8 @@ from inverse_dynamics import Array, HERE, markdown, processor_name, write
 import numpy as np
 from stewart_dynamics import Parameters
 from stewart_dynamics.identification.identification_options import DesignOptions
-from stewart_dynamics.identification.motion_design import Design, design, predicted_half_widths
+from stewart_dynamics.identification.motion_design import (
+    Design, design, noise_of, predicted_half_widths)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 sys.path.insert(0, str(HERE.parent / 'test'))
@@ -82,8 +83,8 @@ def main() -> None:
             'from sweeps at once.'), '']
     lines += [(
         f'{asked.duration:.0f} s up to {asked.frequency:g} Hz, efforts at {asked.rate:g} Hz with '
-        f'white noise of {asked.noise:g} N. A design takes {took:.0f} s of processor time, seed '
-        f'{asked.seed}.'), '', (
+        f'white noise of {noise_of(asked, file):g} N. A design takes {took:.0f} s of processor '
+        f'time, seed {asked.seed}.'), '', (
         f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
         f'{platform.python_version()}.'), '']
     print('\n'.join(lines))

@@ -5,9 +5,9 @@
 Study of how often the intervals of stewart_identify and of the payload contain the truth.
 
 True hexapods are drawn from the uncertainty of the parameter file, legs, gain, reflected masses
-and tilt included, see ``test/estimate_cases.py``. ``--table`` shows the answers to recordings
-that are poor, or in conflict with the file. Run by hand, ``make bench-coverage``; see README.md
-in this folder.
+and tilt included, see ``test/estimate_cases.py``, with telescopic legs or, ``--legs crank``, with
+cranks. ``--table`` shows the answers to recordings that are poor, or in conflict with the file.
+Run by hand, ``make bench-coverage``; see README.md in this folder.
 """
 
 from __future__ import annotations
@@ -29,14 +29,16 @@ from stewart_dynamics.external_wrench.payload import identify
 
 sys.path.append(str(HERE.parent / 'test'))
 from estimate_cases import (  # noqa: E402, I100, I202
-    about_tilted, AXES, braked, drawn, EXACT, FILE, GIVEN, history_of, identified,
-    Judged, MOTIONS, one_axis, Outcome, payload, PAYLOAD_SECONDS, PAYLOAD_SENSORS, prior,
-    recorded, recording, rich, SECONDS, SENSORS, stopping, Truth, with_friction)
+    about_tilted, AXES, braked, CASES, CLOSED_LOOP, drawn, EXACT, FILE, GIVEN, history_of,
+    identified, Judged, MOTIONS, one_axis, Outcome, payload, PAYLOAD_SECONDS, PAYLOAD_SENSORS,
+    prior, RATE, recorded, recording, rich, SECONDS, SENSORS, stopping, Truth, with_friction)
 from independent_hexapod import moving  # noqa: E402, I202
 from recorded import Noise  # noqa: E402, I202
 from referees import rng  # noqa: E402, I202
 
 BEGIN, END = '<!-- coverage: begin -->', '<!-- coverage: end -->'
+BEGIN_CRANKS, END_CRANKS = (
+    '<!-- coverage of cranks: begin -->', '<!-- coverage of cranks: end -->')
 BEGIN_TABLE, END_TABLE = '<!-- estimates: begin -->', '<!-- estimates: end -->'
 PAYLOAD = 'payload: '
 # Motions of the payload service.
@@ -45,6 +47,13 @@ GROUPS = {'mass': 'platform.mass', **{f'center {axis}': f'platform.center_of_mas
                                       for axis in 'xyz'},
           'inertia': 'platform.inertia', 'viscous': 'actuator.viscous_friction',
           'Coulomb': 'actuator.coulomb_friction'}
+# Further columns for cranks, and sampling rates: 200 recordings of cranks have few samples.
+OF_CRANKS = {'rotors': 'actuator.reflected_inertia', 'moments': 'legs.crank.first_moment',
+             'K1': 'legs.crank.shaft_inertia', 'K2': 'legs.crank.shaft_moment.e',
+             'm_c y_c': 'legs.crank.shaft_moment.n', 'm_ab': 'legs.rod.coupling_mass'}
+ASKED = {'telescopic': ('platform', 'friction'),
+         'crank': ('platform', 'friction', 'reflected_inertia', 'crank')}
+RATES = {'telescopic': RATE, 'crank': 100.0}
 
 
 def in_processes(function: Callable[[Any], Any], runs: Sequence[Any]) -> list[Any]:
@@ -62,21 +71,28 @@ class Run(NamedTuple):
 
     motion: str
     seed: int
+    legs: str = 'telescopic'
+    friction: bool = True
 
 
 def outcome_of(run: Run) -> Outcome:
     """Return the outcome for a hexapod that is drawn."""
-    truth = drawn(run.seed)
+    given = CASES[run.legs].given
+    if not run.friction:
+        given = given.replaced(dict.fromkeys(
+            ('actuator.viscous_friction', 'actuator.coulomb_friction'), 0.0))
+    truth, rate = drawn(run.seed, given), RATES[run.legs]
     if run.motion.startswith(PAYLOAD):
-        return payload(truth, run.motion.removeprefix(PAYLOAD), run.seed)
-    return identified([recorded(truth, run.motion, run.seed)], truth, hold_out=0.0)
+        return payload(truth, run.motion.removeprefix(PAYLOAD), run.seed, given=given)
+    return identified([recorded(truth, run.motion, run.seed, rate=rate)], truth, given, rate,
+                      hold_out=0.0, kinds=ASKED[run.legs])
 
 
 def by_parameter(judged: Sequence[Judged]) -> dict[str, list[Judged]]:
     """Return the estimates by parameter; friction by its kind."""
     found: dict[str, list[Judged]] = {}
     for each in judged:
-        name = each.name.rpartition('.')[0] if 'actuator' in each.name else each.name
+        name = each.name if each.name.startswith('platform') else each.name.rpartition('.')[0]
         found.setdefault(name, []).append(each)
     return found
 
@@ -102,23 +118,29 @@ def summary(motion: str, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
     sure = [each for each in judged if each.identified]
     return (motion, *over_parameters(judged), *over_parameters(sure),
             f'{len(sure) / len(outcomes):.1f}',
-            f'{np.median([each.half / prior(each.name) for each in judged]):.2g}' if judged
+            f'{np.median([each.half / width(each) for each in judged]):.2g}' if judged
             else '-', f'{sum(bool(each.causes) for each in outcomes)} of {len(outcomes)}')
 
 
-def details(motion: str, outcomes: Sequence[Outcome]) -> Iterator[str]:
+def width(each: Judged) -> float:
+    """Return the deviation by which the file knows a value; of friction, its own size there."""
+    return prior(each.name) if each.name in FILE.values() else each.prior
+
+
+def details(motion: str, outcomes: Sequence[Outcome], groups: dict[str, str]) -> Iterator[str]:
     """Yield the cells of a motion: for each group the share, and the width by the prior."""
     yield motion
-    for begin in GROUPS.values():
+    for begin in groups.values():
         judged = [each for outcome in outcomes for each in outcome.intervals
                   if each.name.startswith(begin)]
         yield '-' if not judged else f'{share(judged):.1f} %, ' + (
-            f'{np.median([each.half / prior(each.name) for each in judged]):.2g}')
+            f'{np.median([each.half / width(each) for each in judged]):.2g}')
 
 
-def coverage(seeds: int, motions: Sequence[str]) -> list[str]:
+def coverage(seeds: int, motions: Sequence[str], legs: str, friction: bool) -> list[str]:
     """Return the tables of how many intervals contain the true value."""
-    runs = [Run(motion, seed) for motion in motions for seed in range(seeds)]
+    runs = [Run(motion, seed, legs, friction) for motion in motions for seed in range(seeds)]
+    groups = {**GROUPS, **(OF_CRANKS if legs == 'crank' else {})}
     found = in_processes(outcome_of, runs)
     of_motion = {motion: [outcome for outcome, run in zip(found, runs, strict=True)
                           if run.motion == motion] for motion in motions}
@@ -126,8 +148,8 @@ def coverage(seeds: int, motions: Sequence[str]) -> list[str]:
         ('motion', 'truth in intervals', 'lowest', 'identified alone', 'lowest',
          'identified of a run', 'half of the interval by the prior', 'runs with a notice'),
         *(summary(*each) for each in of_motion.items())]), '', *markdown([
-            ('motion', *GROUPS), *(tuple(details(*each)) for each in of_motion.items())]), '',
-            f'{seeds} seeds of each motion.', '']
+            ('motion', *groups), *(tuple(details(*each, groups)) for each in of_motion.items())]),
+            '', f'{seeds} seeds of each motion.', '']
 
 
 # --- recordings that are poor, or in conflict with the file --------------------------------------
@@ -309,15 +331,21 @@ def main() -> None:
     parser.add_argument('--seeds', type=int, default=200, help='of each motion (%(default)s)')
     parser.add_argument('--only', default='', help='motions or rows that contain this text')
     parser.add_argument('--table', action='store_true', help='poor recordings, not the coverage')
+    parser.add_argument('--legs', choices=list(CASES), default='telescopic', help='kind of legs')
+    parser.add_argument('--no-friction', dest='friction', action='store_false',
+                        help='neither the hexapods nor the file have friction')
     parser.add_argument('--write', action='store_true', help='put the tables into README.md')
     options = parser.parse_args()
     motions = [each for each in (*MOTIONS, *(f'{PAYLOAD}{each}' for each in OF_PAYLOAD))
-               if options.only in each]
-    lines = table(options.only) if options.table else coverage(options.seeds, motions)
+               if options.only in each and (
+                   options.legs == 'telescopic' or CLOSED_LOOP not in each)]
+    lines = table(options.only) if options.table else coverage(
+        options.seeds, motions, options.legs, options.friction)
     lines += [measured_on(), '']
     print('\n'.join(lines))
     if options.write:
-        write(lines, *((BEGIN_TABLE, END_TABLE) if options.table else (BEGIN, END)))
+        write(lines, *((BEGIN_TABLE, END_TABLE) if options.table else (BEGIN, END)
+                       if options.legs == 'telescopic' else (BEGIN_CRANKS, END_CRANKS)))
 
 
 if __name__ == '__main__':

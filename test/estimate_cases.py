@@ -4,8 +4,9 @@
 """
 Recordings that judge the estimates of identification and payload.
 
-True hexapods are drawn from ``uncertainty.*`` of the parameter file, their motions and forces are
-those of ``independent_hexapod``, and sensors add noise, quantization, jitter and delay.
+True hexapods are drawn from ``uncertainty.*`` of the parameter file, their motions and efforts are
+those of ``independent_hexapod`` and ``cranks_by_virtual_power``, and sensors add noise, quantization,
+jitter and delay.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import cranks_by_virtual_power
 from independent_hexapod import Controlled, Legs, moving
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +50,34 @@ SLOW = 8e-3  # largest rate of a leg in a slow motion [m/s]
 
 # --- hexapods ------------------------------------------------------------------------------------
 
+class Case(NamedTuple):
+    """A parameter file of a kind of legs, its true legs, and the sizes of motions and noise."""
+
+    given: Parameters
+    moving: Callable[[Parameters, Motion], Any]
+    center: Array  # of the motions: x y z and Euler angles
+    size: float = 1.0  # of the motions
+    reach: float = 1.0  # movement of a joint by that of its drive
+
+    def placed(self, path: Sines) -> Sines:
+        """Return a motion of the telescopic hexapod as one of this hexapod."""
+        return path._replace(sines=self.size * path.sines,
+                             center=path.center + (self.center - HOME))
+
+    def noise(self, sensors: Noise) -> Noise:
+        """Return sensors that are as good as these of the telescopic hexapod."""
+        return sensors._replace(
+            length=sensors.length / self.reach, rate=sensors.rate / self.reach,
+            effort=sensors.effort * self.reach, coloured=sensors.coloured * self.reach)
+
+
+CRANKS = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
+CASES = {
+    'telescopic': Case(GIVEN, moving, HOME),
+    'crank': Case(CRANKS, cranks_by_virtual_power.moving, np.array([0.0, 0.0, 0.648, 0.0, 0.0, 0.0]),
+                  1.0, float(CRANKS['legs.crank.length'][0]))}
+
+
 class Truth(NamedTuple):
     """A true hexapod, its gravity as the base frame has it, and the gain of its efforts."""
 
@@ -55,6 +85,11 @@ class Truth(NamedTuple):
     tilt: tuple[float, float] = (0.0, 0.0)
     """Angles of gravity about x, then y [rad]; the parameters have it."""
     gain: float = 1.0
+
+    @property
+    def case(self) -> Case:
+        """Return the case of its kind of legs."""
+        return CASES[self.parameters.leg_kind.name]
 
     def changed(self, **changes: Any) -> Truth:
         """Return a truth with other parameters; ``__`` in a name for a point."""
@@ -74,36 +109,71 @@ class Truth(NamedTuple):
         found |= {'gravity.tilt_x': self.tilt[0], 'gravity.tilt_y': self.tilt[1]}
         for leg, joint in enumerate(p['joints']):
             found |= {f'actuator.{name}.{joint}': p[f'actuator.{name}'][leg] for name in (
-                'viscous_friction', 'coulomb_friction', 'reflected_mass')}
-            for part in ('cylinder', 'piston'):
-                m, s, i = (p[f'legs.{part}.{name}'][leg] for name in (
-                    'mass', 'center_of_mass', 'inertia'))
-                found |= {f'legs.{part}.mass.{joint}': m,
-                          f'legs.{part}.first_moment.{joint}': m * s,
-                          f'legs.{part}.second_moment.{joint}': i + m * s * s}
-        return found
+                'viscous_friction', 'coulomb_friction')}
+        return found | (_of_cranks(p) if 'legs.crank.length' in p.given else _of_pistons(p))
+
+
+def _of_pistons(p: Parameters) -> dict[str, float]:
+    """Return the values of telescopic legs."""
+    found = {}
+    for leg, joint in enumerate(p['joints']):
+        found[f'actuator.reflected_mass.{joint}'] = p['actuator.reflected_mass'][leg]
+        for part in ('cylinder', 'piston'):
+            m, s, i = (p[f'legs.{part}.{name}'][leg] for name in (
+                'mass', 'center_of_mass', 'inertia'))
+            found |= {f'legs.{part}.mass.{joint}': m,
+                      f'legs.{part}.first_moment.{joint}': m * s,
+                      f'legs.{part}.second_moment.{joint}': i + m * s * s}
+    return found
+
+
+def _of_cranks(p: Parameters) -> dict[str, float]:
+    """Return the values of cranks and rods, and the sums of them that torques show."""
+    found = {}
+    bodies, rotors = cranks_by_virtual_power.CrankBodies.of(p), p['actuator.reflected_inertia']
+    for leg, joint in enumerate(p['joints']):
+        mass, size = p['legs.crank.mass'][leg], p['legs.crank.length'][leg]
+        x, y, _ = bodies.centers[leg]
+        about = bodies.inertias[leg] + mass * (x ** 2 + y ** 2)
+        rod, length = p['legs.rod.mass'][leg], p['legs.rod.length'][leg]
+        part, turning = bodies.rod_centers[leg] / length, bodies.rod_inertias[leg] / length ** 2
+        end = rod * (1.0 - part) ** 2 + turning
+        of_leg = {
+            'actuator.reflected_inertia': rotors[leg], 'legs.crank.first_moment.e': mass * x,
+            'legs.crank.first_moment.n': mass * y, 'legs.crank.inertia_about_axis.uu': about,
+            'legs.rod.crank_end_mass': end,
+            'legs.rod.coupling_mass': rod * part * (1.0 - part) - turning,
+            'legs.rod.platform_end_mass': rod * part ** 2 + turning,
+            'legs.crank.shaft_inertia': about + rotors[leg] + end * size ** 2,
+            'legs.crank.shaft_moment.e': mass * x + end * size,
+            'legs.crank.shaft_moment.n': mass * y}
+        found |= {f'{name}.{joint}': float(value) for name, value in of_leg.items()}
+    return found
 
 
 FILE = Truth(GIVEN)
 PLATFORM = list(FILE.values())[:10]  # names of mass, center of mass and inertia
 
 
-def prior(name: str) -> float:
+def prior(name: str, given: Parameters = GIVEN) -> float:
     """Return the standard deviation by which a file knows a value; of friction, its own size."""
-    kind, value = name.split('.')[1], FILE.values()[name]
+    kind, value = name.split('.')[1], Truth(given).values()[name]
     if kind == 'inertia':
-        value = np.mean(GIVEN['platform.inertia'][[0, 3, 5]])
-    known = {'mass': 'platform_mass', 'inertia': 'inertia', 'reflected_mass': 'reflected_mass'}
+        value = np.mean(given['platform.inertia'][[0, 3, 5]])
+    known = {'mass': 'platform_mass', 'inertia': 'inertia', 'reflected_mass': 'reflected_mass',
+             'reflected_inertia': 'reflected_mass'}
     if kind == 'center_of_mass':
-        return float(GIVEN['uncertainty.center_of_mass'])
+        return float(given['uncertainty.center_of_mass'])
     if kind.startswith('tilt'):
-        return float(GIVEN['uncertainty.tilt'])
-    return float(value * (GIVEN[f'uncertainty.{known[kind]}'] if kind in known else 1.0))
+        return float(given['uncertainty.tilt'])
+    return float(value * (given[f'uncertainty.{known[kind]}'] if kind in known else 1.0))
 
 
-def drawn(seed: int) -> Truth:
+def drawn(seed: int, given: Parameters = GIVEN) -> Truth:
     """Return a hexapod drawn from the uncertainty of the file, with any friction."""
-    random, p = rng(seed), GIVEN
+    random, p = rng(seed), given
+    kind = p.leg_kind
+    reflected = kind.fields['reflected_mass']
 
     def relative(name: str, size: int | tuple[int, ...] = ()) -> Any:
         return 1.0 + p[f'uncertainty.{name}'] * np.clip(random.normal(size=size), -3.0, 3.0)
@@ -115,14 +185,20 @@ def drawn(seed: int) -> Truth:
         'platform.mass': mass,
         'platform.center_of_mass': p['platform.center_of_mass'] + p[
             'uncertainty.center_of_mass'] * random.normal(size=3),
-        'platform.inertia': _inertia(random),
-        'actuator.reflected_mass': p['actuator.reflected_mass'] * relative('reflected_mass', 6),
+        'platform.inertia': _inertia(random, given),
+        reflected: p[reflected] * relative('reflected_mass', 6),
         **{f'actuator.{kind}_friction': p[f'actuator.{kind}_friction'] * random.uniform(
             0.3, 2.0, 6) for kind in ('viscous', 'coulomb')}}
-    for part in ('cylinder', 'piston'):
+    of_rods = cranks_by_virtual_power.CrankBodies.of(p) if kind.name == 'crank' else None
+    for part in kind.bodies:
         for name in ('mass', 'center_of_mass', 'inertia'):
-            changes[f'legs.{part}.{name}'] = p[f'legs.{part}.{name}'] * (
-                relative('leg_mass') + relative('leg_mass', 6) - 1.0)
+            value = p[f'legs.{part}.{name}']
+            if value is None and of_rods is not None:
+                value = of_rods.rod_centers if name == 'center_of_mass' else of_rods.rod_inertias
+            value = value * (relative('leg_mass') + relative('leg_mass', 6) - 1.0)
+            if (part, name) == ('crank', 'inertia'):  # of six numbers, about the axis alone
+                value = np.outer(value, np.arange(6) == 5)
+            changes[f'legs.{part}.{name}'] = value
     tilt = p['uncertainty.tilt'] * random.normal(size=2)
     changes['gravity'] = tilted(p['gravity'], *tilt)
     return Truth(p.replaced(changes), tuple(tilt), float(relative('effort_gain')))
@@ -142,10 +218,10 @@ def tilted(gravity: Array, about_x: float, about_y: float) -> Array:
     return turned
 
 
-def _inertia(random: np.random.Generator) -> Array:
+def _inertia(random: np.random.Generator, p: Parameters) -> Array:
     """Return an inertia about the file's that a real body has."""
-    given = GIVEN['platform.inertia']
-    scale = GIVEN['uncertainty.inertia'] * np.mean(given[[0, 3, 5]])
+    given = p['platform.inertia']
+    scale = p['uncertainty.inertia'] * np.mean(given[[0, 3, 5]])
     change = scale * random.normal(size=6)
     while True:
         xx, xy, xz, yy, yz, zz = found = given + change
@@ -274,9 +350,9 @@ CLOSED_LOOP = 'closed loop'
 
 def legs_of(truth: Truth, motion: str, seed: int, seconds: float = SECONDS) -> LegsAt:
     """Return the legs of a hexapod in a motion of MOTIONS."""
-    path = MOTIONS[motion](rng(7000 + seed))
+    path = truth.case.placed(MOTIONS[motion](rng(7000 + seed)))
     if CLOSED_LOOP not in motion:
-        return lambda times: moving(truth.parameters, path(times))
+        return lambda times: truth.case.moving(truth.parameters, path(times))
     times = np.arange(0.0, seconds + 0.1, Controlled.PERIOD)
     return Controlled(truth.parameters, path(times))
 
@@ -289,7 +365,7 @@ QUANTIZED = SENSORS._replace(steps=(1e-6, 1e-3, 5.0))
 
 
 def recording(legs: LegsAt, seed: int, sensors: Noise = SENSORS, gain: float = 1.0,
-              seconds: float = SECONDS, rate: float = RATE) -> Recorded:
+              seconds: float = SECONDS, rate: float = RATE, given: Parameters = GIVEN) -> Recorded:
     """Return a recording of some legs; ``legs`` begin at 0 s."""
     random = rng(9000 + seed)
     stamps = np.arange(round(seconds * rate)) / rate
@@ -299,7 +375,7 @@ def recording(legs: LegsAt, seed: int, sensors: Noise = SENSORS, gain: float = 1
     noise = random.normal(size=(4, len(stamps), 6))
     drive = np.sqrt(1.0 - memory ** 2) * noise[3]
     drive[0] = noise[3, 0]
-    values = (there.lengths - GIVEN['geometry.zero_length'] + sensors.length * noise[0],
+    values = (there.lengths - given['geometry.zero_length'] + sensors.length * noise[0],
               there.rates + sensors.rate * noise[1],
               gain * pushed.forces + sensors.effort * noise[2]
               + sensors.coloured * lfilter([1.0], [1.0, -memory], drive, axis=0))
@@ -309,8 +385,9 @@ def recording(legs: LegsAt, seed: int, sensors: Noise = SENSORS, gain: float = 1
 def recorded(truth: Truth, motion: str, seed: int, sensors: Noise = SENSORS,
              seconds: float = SECONDS, rate: float = RATE) -> Recorded:
     """Return a recording of a hexapod in a motion of MOTIONS."""
-    return recording(legs_of(truth, motion, seed, seconds), seed, sensors, truth.gain, seconds,
-                     rate)
+    case = truth.case
+    return recording(legs_of(truth, motion, seed, seconds), seed, case.noise(sensors), truth.gain,
+                     seconds, rate, case.given)
 
 
 def braked(legs: LegsAt, begin: float, end: float) -> LegsAt:
@@ -334,6 +411,8 @@ class Judged(NamedTuple):
     """Half of the 95 % interval; nan: none."""
     identified: bool
     truth: float
+    prior: float
+    """Standard deviation by which the file knows the value."""
 
     @property
     def holds(self) -> bool:
@@ -366,12 +445,12 @@ class Outcome(NamedTuple):
         return next(each for each in self.judged if each.name == name)
 
 
-def identified(bags: Sequence[Recorded], truth: Truth, given: Parameters = GIVEN,
+def identified(bags: Sequence[Recorded], truth: Truth, given: Parameters | None = None,
                rate: float = RATE, **options: Any) -> Outcome:
     """Return the outcome of stewart_identify without bag files."""
     chosen = IdentificationOptions(**options)
     try:
-        with closing(Identification(given, chosen)) as work:
+        with closing(Identification(given or truth.case.given, chosen)) as work:
             for n, each in enumerate(bags):
                 work.add(Path(f'bag {n}'), [Window(
                     0, 1.0 / rate, each.positions, each.rates, each.efforts,
@@ -386,19 +465,20 @@ def identified(bags: Sequence[Recorded], truth: Truth, given: Parameters = GIVEN
     values = truth.values()
     return Outcome(
         tuple(Judged(each['name'], each['value'], np.diff(each['interval'])[0] / 2.0 if each[
-            'interval'] else np.nan, each['state'] == 'identified', values[each['name']])
-            for each in result['parameters']),
+            'interval'] else np.nan, each['state'] == 'identified', values[each['name']],
+            each['file_deviation'])
+            for each in (*result['parameters'], *result.get('base_parameters', ()))),
         tuple(what for what, _ in found), (*(text for _, text in found), *of_bags),
         result['bags'][0]['delay_s'] or np.nan)
 
 
-def history_of(given: Recorded, motion: Motion) -> LegHistory:
+def history_of(given: Recorded, motion: Motion, p: Parameters = GIVEN) -> LegHistory:
     """Return the recording as the node keeps it; poses near those of a motion."""
-    platform = StewartPlatform(GIVEN)  # for the geometry
-    poses = platform.forward_kinematics(given.positions + GIVEN['geometry.zero_length'], motion)
+    platform = StewartPlatform(p)  # for the geometry
+    poses = platform.forward_kinematics(given.positions + p['geometry.zero_length'], motion)
     rows = np.hstack([poses.position, poses.rotation.reshape(-1, 9),
                       platform.twist(poses, given.rates)])
-    history = LegHistory(GIVEN['payload.window'])
+    history = LegHistory(p['payload.window'])
     for time, row, forces in zip(given.times, rows.tolist(), given.efforts.tolist(), strict=True):
         history.add(tuple(forces), Estimate(
             round((2.0 + time) * 1e9), tuple(row), None, None, NO_BASE), NO_WRENCH)
@@ -410,16 +490,19 @@ PAYLOAD_SENSORS = SENSORS._replace(rate=1e-3, effort=5.0, delay=0.5 / PAYLOAD_RA
 
 
 def payload(truth: Truth, motion: str, seed: int, sensors: Noise = PAYLOAD_SENSORS,
-            given: Parameters = GIVEN) -> Outcome:
+            given: Parameters | None = None) -> Outcome:
     """Return the outcome of the payload service."""
+    case = truth.case
+    given = given or case.given
     legs = recorded(truth, motion, seed, sensors, PAYLOAD_SECONDS, PAYLOAD_RATE)
-    near = MOTIONS[motion](rng(7000 + seed))(legs.times)
-    *_, outcome = identify(history_of(legs, near), StewartPlatform(given))
+    near = case.placed(MOTIONS[motion](rng(7000 + seed)))(legs.times)
+    *_, outcome = identify(history_of(legs, near, case.given), StewartPlatform(given))
     assert outcome is not None
     if outcome.payload is None:
         return Outcome((), ('rejected',), (outcome.message,))
     fitted = outcome.payload.fitted
     return Outcome(tuple(
-        Judged(name, value, half if known else np.nan, known, truth.values()[name])
+        Judged(name, value, half if known else np.nan, known, truth.values()[name],
+               prior(name, given))
         for name, (_, _, value, half, known) in zip(PLATFORM, rows_of(fitted), strict=True)),
         ('effort_gain',) if fitted.gain else ())

@@ -16,14 +16,23 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from estimate_cases import CASES, rich  # noqa: E402, I100
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
+from referees import rng  # noqa: E402
 from running import (  # noqa: E402
     bits, DynamicsNode, ERROR, header, INPUTS, NODE, OK, Planner, ROOT, Sample, WARN)
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import Float64MultiArray  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
 from stewart_dynamics import Capability, StewartPlatform  # noqa: E402
+from stewart_dynamics.arrays import NO_WRENCH  # noqa: E402
+from stewart_dynamics.external_wrench.estimate import ExternalWrench  # noqa: E402
+from stewart_dynamics.external_wrench.measured_legs import (  # noqa: E402
+    LegHistory, MeasuredLegs)
+from stewart_dynamics.external_wrench.payload import identify  # noqa: E402
 from stewart_dynamics.mechanics.batch import missing_distances  # noqa: E402
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: E402
+from stewart_dynamics.messages.joint_state import JointStateWriter  # noqa: E402
 from stewart_dynamics.replay.replay_command_line import main as replay  # noqa: E402
 from test_replay import recorded, write_bag  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
@@ -424,3 +433,37 @@ def test_a_planned_trajectory_is_answered_or_rejected_by_the_name_of_the_leg(
     assert 'largest torque (N m)' in node.values('planned trajectory')
     planner.send([HOME, TOO_HIGH], step=1_000_000_000)
     planner.until_rejected(' cannot reach: ', 1)
+
+
+def test_the_payload_on_cranks_is_identified_by_a_service(start: Start) -> None:
+    """Measured angles, speeds and torques give the answer of the library."""
+    node = start('setpoint.timeout:=60.0', file=CRANKS)
+    node.until_active()
+    loaded = StewartPlatform(PLATFORM.parameters.replaced({
+        'platform.mass': 195.0, 'platform.center_of_mass': [0.06, -0.03, 0.38]}))
+    seconds = 0.01 * np.arange(400)
+    path = CASES['crank'].placed(rich(rng(4)))
+    moved, acting = (loaded.inverse_dynamics(path(seconds - late)) for late in (0.0, 0.005))
+    joints = JointStateWriter(JOINTS)
+    states = [joints.write(LATER + round(1e9 * time), *each) for time, *each in zip(
+        seconds, moved.angles, moved.speeds, acting.torques, strict=True)]
+    parameters, history = PLATFORM.parameters.replaced({'setpoint.timeout': 60.0}), LegHistory(10)
+    follow = MeasuredLegs(parameters, ExternalWrench(parameters), print, print, history)
+    assert all(follow.take(each, NO_WRENCH, None) for each in states)
+    *_, expected = identify(history, StewartPlatform(parameters))
+    assert expected is not None and expected.payload is not None
+    assert expected.payload.fitted.body.mass == pytest.approx(
+        195.0, abs=expected.payload.fitted.half_widths[0])
+
+    writer = node.peer.writer(f'{NODE}/measured_legs', JointState)
+    client = node.peer.node.create_client(Trigger, f'{NODE}/identify_payload')
+    node.until(client.service_is_ready, 'the service is there')
+    node.until(writer.get_subscription_count, 'the node hears measured legs')
+    for each in states:
+        writer.publish(each)
+    node.until(lambda: node.values('external wrench').get('wrenches') == str(len(states) - 1),
+               'all measurements are used')
+    answer = client.call_async(Trigger.Request())
+    node.until(answer.done, 'the service answers')
+    assert answer.result().success
+    assert answer.result().message == expected.message

@@ -21,7 +21,7 @@ from stewart_dynamics.identification.identification_options import (
 from stewart_dynamics.identification.identify import Identification
 from stewart_dynamics.identification.identify_command_line import main
 from stewart_dynamics.identification.motion_design import (
-    Design, design, fine_times, predicted_half_widths)
+    Design, design, fine_times, noise_of, predicted_half_widths)
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.reference_motion.motion_functions import motion_at
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
@@ -115,7 +115,7 @@ def test_the_predicted_intervals_are_those_that_an_identification_states(
     rate = SMALL.rate
     times = np.arange(round(12.0 * rate)) / rate
     legs = moving(hexapod, motion_at(small.trajectory, times))
-    efforts = legs.forces + SMALL.noise * rng(1).normal(size=legs.forces.shape)
+    efforts = legs.forces + noise_of(SMALL, hexapod) * rng(1).normal(size=legs.forces.shape)
     with closing(Identification(hexapod, IdentificationOptions(hold_out=0.0))) as work:
         work.add(Path('a bag'), [Window(
             0, 1.0 / rate, legs.lengths - hexapod['geometry.zero_length'], legs.rates, efforts,

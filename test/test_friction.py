@@ -13,7 +13,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.drives.measured_efforts import without_losses
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.dynamics.friction import Friction, slip_in_noise
-from stewart_dynamics.mechanics.dynamics.linear_parameters import COULOMB_FRICTION
+from stewart_dynamics.mechanics.dynamics.linear_parameters import Places
 
 
 def with_friction(seed: int) -> tuple[Parameters, Friction, Array]:
@@ -54,7 +54,7 @@ def test_dynamics_and_regressor_have_the_same_law(seed: int) -> None:
         forces = platform.inverse_dynamics(same).forces - free.inverse_dynamics(same).forces
         np.testing.assert_allclose(
             forces, found.forces(rates), atol=1e-9 * np.abs(forces).max() + 1e-9)
-        columns = platform.regressors(rows)[..., COULOMB_FRICTION]
+        columns = platform.regressors(rows)[..., Places.of(p.leg_kind).coulomb_friction]
         np.testing.assert_array_equal(
             np.diagonal(columns, axis1=1, axis2=2) * found.coulomb + 0.0,
             found.without_viscous.forces(rates))

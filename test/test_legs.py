@@ -12,17 +12,10 @@ import shutil
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 from referees import ROOT
-from stewart_dynamics import (
-    calibrate, Capability, MotionCueing, ParameterError, Parameters, Pose, StewartPlatform)
-from stewart_dynamics.calibration.pose_design import design_poses
-from stewart_dynamics.cueing.cueing_parameters import CueingParameters
+from stewart_dynamics import Capability, ParameterError, Parameters, StewartPlatform
 from stewart_dynamics.export.linuxcnc import hal_lines
-from stewart_dynamics.identification.identification_options import IdentificationOptions
-from stewart_dynamics.identification.identify import Identification
-from stewart_dynamics.identification.motion_design import design, DesignOptions
 from stewart_dynamics.legs import CRANK, require_kind, TELESCOPIC
 from stewart_dynamics.program import BAD_INPUT
 
@@ -34,11 +27,7 @@ NOT_FOR_CRANKS = 'legs.crank.length: {}: available for telescopic legs alone'
 LINUXCNC = '--linuxcnc: genhexkins has lengths of legs'
 # Arguments of each program, and the feature that hexapods with cranks lack.
 PROGRAMS = {
-    'stewart_cueing_report vehicle.csv': 'motion cueing',
-    'stewart_export --fmu --linuxcnc': LINUXCNC, 'stewart_export --linuxcnc': LINUXCNC,
-    'stewart_identify bag': 'identification', 'stewart_identify --design': 'identification'}
-NODES = {
-    f'stewart_cueing --ros-args --params-file {CRANK_FILE}': 'motion cueing'}
+    'stewart_export --fmu --linuxcnc': LINUXCNC, 'stewart_export --linuxcnc': LINUXCNC}
 
 
 def run(folder: Path, program: str, *arguments: str | Path) -> tuple[int, str, str]:
@@ -58,26 +47,10 @@ def test_a_program_that_does_not_know_a_kind_says_so_first(tmp_path: Path, comma
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.ros
-@pytest.mark.parametrize('command', NODES)
-def test_a_node_that_does_not_know_a_kind_does_not_start(tmp_path: Path, command: str) -> None:
-    pytest.importorskip('rclpy')
-    program, *arguments = command.split()
-    code, out, err = run(tmp_path, program, *arguments)
-    assert (code, out) == (1, '')
-    assert err == f'{program}: {CRANK_FILE}: {NOT_FOR_CRANKS.format(NODES[command])}\n'
-
-
 CALLS: dict[str, Callable[[StewartPlatform], object]] = {
     'clearance between legs': lambda platform: Capability(platform).clearance(
         platform.home_pose()),
-    'motion cueing': lambda platform: MotionCueing(platform.parameters),
-    'identification': lambda platform: Identification(
-        platform.parameters, IdentificationOptions()),
-    'identification ': lambda platform: design(platform.parameters, DesignOptions()),
-    LINUXCNC: lambda platform: hal_lines(platform.parameters),
-    'motion cueing ': lambda platform: CueingParameters(
-        platform.parameters.given, platform.parameters.source)}
+    LINUXCNC: lambda platform: hal_lines(platform.parameters)}
 
 
 @pytest.mark.parametrize('feature', CALLS)
@@ -255,7 +228,6 @@ EDITS = {
 PROGRAM = """
 import sys
 
-import numpy as np
 from stewart_dynamics import (
     BaseMotion, GovernedStream, Motion, ParameterError, Parameters, StewartPlatform)
 from stewart_dynamics.legs import KINDS

@@ -18,14 +18,18 @@ from snapshot import Snapshot
 
 from stewart_dynamics import (
     BaseMotion, Motion, MotionError, ParameterError, Parameters, SingularityError, StewartPlatform)
+from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
-    COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, LINEAR, linear_parameters,
-    names_of, OFFSET, parameter_values, PISTON_MASS, PISTON_SECOND, PLATFORM, REFLECTED_MASS,
-    UNITS, VISCOUS_FRICTION)
+    linear_parameters, mass_places, names_of, parameter_values, Places, PLATFORM, units_of)
 
 Array = NDArray[np.float64]
 
 MANY = 20
+_, REFLECTED_MASS, VISCOUS_FRICTION, COULOMB_FRICTION, OFFSET = Places.of(TELESCOPIC)
+CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND, PISTON_MASS, PISTON_SECOND = (
+    mass_places(TELESCOPIC, f'legs.{name}') for name in (
+        'cylinder.mass', 'cylinder.first_moment', 'cylinder.second_moment', 'piston.mass',
+        'piston.second_moment'))
 
 
 @given(st.integers(0, 10 ** 6), st.booleans(), st.booleans())
@@ -110,9 +114,9 @@ def test_parameters_that_no_motion_identifies() -> None:
 def test_each_column_has_a_name_and_a_unit() -> None:
     p = random_parameters(rng(5))
     whole = StewartPlatform(p).regressor(random_motion(p, rng(5), 12))
-    assert whole.matrix.shape == (12, 6, LINEAR)
-    assert len(whole.names) == len(set(whole.names)) == len(UNITS) == LINEAR
-    units = dict(zip(whole.names, UNITS, strict=True))
+    assert whole.matrix.shape == (12, 6, 70)
+    assert len(whole.names) == len(set(whole.names)) == len(units_of(p)) == 70
+    units = dict(zip(whole.names, units_of(p), strict=True))
     assert [units[f'{name}.{p["joints"][2]}'] for name in (
         'legs.cylinder.mass', 'legs.piston.first_moment', 'legs.piston.second_moment',
         'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction',

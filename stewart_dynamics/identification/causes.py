@@ -5,8 +5,8 @@
 Possible causes of a lack of fit, and the forces that each of them adds, as columns.
 
 A cause changes the efforts by its columns times small amounts, to first order: an offset, friction
-of another law, a joint or a zero length elsewhere, another gain or delay of one leg, saturation, a
-payload that changes. Columns are computed at the low rate from the filtered motion.
+of another law, a joint or the zero of a leg elsewhere, another gain or delay of one leg,
+saturation, a payload that changes. Columns are computed at the low rate from the filtered motion.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from stewart_dynamics.identification.extraction import Extract, SLIP
 from stewart_dynamics.identification.parameter_fit import Fit
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.window_poses import motions
+from stewart_dynamics.legs import KINDS
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
@@ -31,10 +32,10 @@ _CHANGES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
 _MOST_BAGS = 6
 # Predicted forces above this fraction of the largest effort may be cut off by saturation.
 _SATURATED = 0.97
-# Finite-difference step of joint coordinates and zero lengths, relative to the platform's size.
+# Finite-difference step of joint coordinates and zeros, relative to the platform's size.
 _STEP = 1e-4
 # Causes with the same forces: a joint that is displaced along its leg, and a zero length.
-SAME = {'zero_length': 'joint'}
+SAME = {zero.what: zero.same_as for zero in (kind.zero_cause for kind in KINDS) if zero.same_as}
 
 _Part = tuple[Array, list['Cause']]
 
@@ -73,13 +74,14 @@ class Causes:
     """
     Columns of all possible causes in some extracts, with the parameters of a fit.
 
-    ``geometry`` adds the joints and zero lengths, which take longer.
+    ``geometry`` adds the joints and zeros, which take longer.
     """
 
     def __init__(self, platform: StewartPlatform, unknowns: Unknowns, fit: Fit,
                  extracts: Iterable[Extract], geometry: bool) -> None:
         p = platform.parameters
         self._platform, self._geometry = platform, geometry
+        self._kind, self._unit = p.leg_kind, p.leg_kind.effort.unit
         self._theta = unknowns.theta(fit.values)
         self.samples, self._largest = 0, 0.0
         begins: dict[int, int] = {}  # samples before each bag
@@ -111,17 +113,18 @@ class Causes:
     def _of_forces(self, extract: Extract, poses: Pose, at: Array) -> Iterator[_Part]:
         """Yield forces that depend on the motion and, of a payload, on time."""
         platform = self._platform
-        lengths, rates, accelerations = np.moveaxis(extract.legs, -1, 0)
+        positions, rates, accelerations = np.moveaxis(extract.legs, -1, 0)
         rows = motions(platform, poses, rates, accelerations)
         matrix = platform.regressors(rows)
         predicted = extract.regressor @ self._theta
 
         yield _part('offset', _by_leg(np.ones((len(rows), 6, 1))),
-                    'a constant offset of the efforts@, {} N', groups=self._each_and_all)
+                    f'a constant offset of the efforts@, {{}} {self._unit}',
+                    groups=self._each_and_all)
         coulomb, *stribeck = (_by_leg(extract.slip[..., n:n + 1]) for n in range(SLIP))
         for columns in stribeck:
-            yield _part('stribeck_friction', columns, 'Stribeck friction, {} N at low rates',
-                        measure=np.mean)
+            yield _part('stribeck_friction', columns,
+                        f'Stribeck friction, {{}} {self._unit} at low rates', measure=np.mean)
         yield _part('load_friction', coulomb * np.abs(predicted)[..., None],
                     'friction that depends on the load, {} % of it', 100.0, np.mean)
         yield _part('gain', _by_leg(predicted[..., None]),
@@ -130,7 +133,7 @@ class Causes:
                     'another delay of the efforts@, {} ms', -1e3, groups=self._each)
         beyond = np.maximum(np.abs(predicted) - _SATURATED * self._largest, 0.0)
         yield _part('saturation', (-np.sign(predicted) * beyond)[..., None],
-                    f'saturation of the efforts at about {self._largest:.4g} N')
+                    f'saturation of the efforts at about {self._largest:.4g} {self._unit}')
         changes = self._changes
         words = [(f'at about {100.0 * change:.0f} %', slice(4 * n, 4 * n + 4))
                  for n, change in enumerate(changes)]
@@ -141,24 +144,25 @@ class Causes:
                     'a payload that changes @ of the time, {} kg', measure=_mass, groups=words)
 
     def _of_geometry(self, extract: Extract, poses: Pose) -> Iterator[_Part]:
-        """Yield derivatives of the forces by zero lengths and joint coordinates [N/m]."""
-        p, step = self._platform.parameters, _STEP * self._size
-        lengths, rates, accelerations = np.moveaxis(extract.legs, -1, 0)
+        """Yield derivatives of the efforts by zeros of positions and joint coordinates."""
+        p, step, zero = self._platform.parameters, _STEP * self._size, self._kind.zero_cause
+        turn = step / float(np.mean(self._kind.reach(p)))
+        positions, rates, accelerations = np.moveaxis(extract.legs, -1, 0)
 
-        def forces(platform: StewartPlatform, lengths: Array) -> Array:
-            found = platform.forward_kinematics(lengths, poses)
+        def forces(platform: StewartPlatform, positions: Array) -> Array:
+            found = platform.forward_kinematics(positions, poses)
             return platform.regressors(
                 motions(platform, found, rates, accelerations)) @ self._whole
 
-        there = forces(self._platform, lengths)
-        yield _part('zero_length', np.stack([
-            (forces(self._platform, lengths + change) - there) / step
-            for change in step * np.eye(6)], axis=-1),
-            'another geometry.zero_length@, {} mm', 1e3, groups=self._each_and_all)
+        there = forces(self._platform, positions)
+        yield _part(zero.what, np.stack([
+            (forces(self._platform, positions + change) - there) / turn
+            for change in turn * np.eye(6)], axis=-1),
+            f'another {zero.name}@, {{}} {zero.unit}', zero.factor, groups=self._each_and_all)
         for end in ('base', 'platform'):
             name = f'geometry.{end}_joints'
             yield _part('joint', np.stack([
-                (forces(StewartPlatform(p.replaced({name: p[name] + change})), lengths) - there)
+                (forces(StewartPlatform(p.replaced({name: p[name] + change})), positions) - there)
                 / step for change in step * np.eye(18).reshape(18, 6, 3)], axis=-1),
                 f'another {end} joint@, moved by {{}} mm', 1e3, groups=[
                     (word, slice(3 * n, 3 * n + 3)) for n, (word, _) in enumerate(self._each)])

@@ -4,9 +4,10 @@
 """
 Extraction of regressor and efforts from a window of recorded legs, filtered and decimated.
 
-Lengths are filtered with a wide band and differentiated, forward kinematics and J_inv give the
-motion, and the regressor is computed at the full rate. Then the same narrow low-pass filter
-decimates regressor and efforts: f = Y theta holds for the filtered signals as well.
+Positions of the drives, which are lengths of telescopic legs, are filtered with a wide band and
+differentiated, forward kinematics and their Jacobian give the motion, and the regressor is
+computed at the full rate. Then the same narrow low-pass filter decimates regressor and efforts:
+f = Y theta holds for the filtered signals as well.
 (Gautier, Venture: "Identification of standard dynamic parameters of robots with positive definite
 inertia matrix", IROS 2013, doi:10.1109/IROS.2013.6697198, section V.)
 
@@ -26,8 +27,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.identification.filters import (
     convolved, decimated, fast_length, LowPass, white_deviation)
-from stewart_dynamics.identification.unknowns import (
-    COULOMB_COLUMNS, regressor_of, Unknowns)
+from stewart_dynamics.identification.unknowns import regressor_of, Unknowns
 from stewart_dynamics.identification.window_poses import motions, poses
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.measured_efforts import FAR, has_losses, without_losses
@@ -83,9 +83,9 @@ class Extract(NamedTuple):
     """(N,) since the start of the window, in ``Extracts`` since the start of the bag [s]"""
     columns: Array
     """(N, 6, n + ORDERS): the regressor of ``Unknowns.theta``, and the effort with its time
-    derivatives [N, N/s, ...]"""
+    derivatives [N, N/s, ...], or [N m, ...]"""
     used: Flags  # (N, 6) whether an effort is fitted: all samples that contribute to it are valid
-    legs: Array  # (N, 6, 3) length, rate and acceleration [m, m/s, m/s^2]
+    legs: Array  # (N, 6, 3) position of the drive, rate and acceleration [m, ...] or [rad, ...]
     slip: Array  # (N, 6, SLIP) shapes of friction over the rate
     poses: Array  # (N, POSE) platform poses at the output times, guesses for forward kinematics
     bag: int = 0
@@ -109,7 +109,7 @@ class WindowRead(NamedTuple):
 
     extract: Extract
     deviations: tuple[float, float]
-    """Standard deviations of the white noise of lengths [m] and rates [m/s]; nan: no rates."""
+    """Standard deviations of the white noise of positions and rates; nan: no rates."""
     stops: int  # number of recorded samples at an end stop or a force limit
     end: Pose  # last pose
     moves: bool  # whether legs move by more than noise
@@ -181,7 +181,10 @@ class Extraction:
         self.platform, self._unknowns, self._period = platform, unknowns, period
         self._losses = of_motors and has_losses(platform.parameters)
         self._coulomb_velocity = platform.parameters.actuator.coulomb_velocity
-        self._size = platform.parameters.singularity.characteristic_length
+        parameters = platform.parameters
+        # Movement of the drives by which a platform joint moves by the size of the platform.
+        self._size = float(parameters.singularity.characteristic_length / np.mean(
+            parameters.leg_kind.reach(parameters)))
         self._wide = LowPass.of(period, WIDE * cutoff, _TRANSITION * cutoff)
         self._narrow = LowPass.of(period, cutoff, _TRANSITION * cutoff)
         self.cutoff, self.speeds = cutoff, speeds
@@ -388,20 +391,20 @@ class Extraction:
             end = min(first + stride - self.step, (last - first) // self.step * self.step + first)
             part = slice(first, end + len(taps))
             regressor = regressor_of(self.platform, rows[part])
-            regressor[:, legs, COULOMB_COLUMNS] = sliding[part]
+            regressor[:, legs, self._unknowns.columns.coulomb] = sliding[part]
             parts.append(decimated(regressor, taps, self.step))
         return np.concatenate(parts)
 
     def _wrong(self, window: Window) -> tuple[Flags, int]:
         """Return outputs (N, 6) affected by invalid samples, and the count of samples at stops."""
-        p = self.platform.parameters
-        lengths = window.positions + p.geometry.zero_length
-        stopped = np.zeros(lengths.shape, dtype=bool)
-        for bound, sign in ((p.limits.length_min, -1.0), (p.limits.length_max, 1.0)):
-            if bound is not None:
-                stopped |= sign * (lengths - bound) > -_STOP * self._size
-        if p.limits.force_max is not None:
-            stopped |= np.abs(window.efforts) > _SATURATED * p.limits.force_max
+        p, kind = self.platform.parameters, self.platform.parameters.leg_kind
+        positions = window.positions + p.geometry.zero_length
+        stopped = np.zeros(positions.shape, dtype=bool)
+        for limit, sign in zip(kind.position_limits, (-1.0, 1.0), strict=True):
+            if p[limit] is not None:
+                stopped |= sign * (positions - p[limit]) > -_STOP * self._size
+        if p[kind.effort_limit] is not None:
+            stopped |= np.abs(window.efforts) > _SATURATED * p[kind.effort_limit]
         bad = (window.outliers | stopped)[self._wide.half:-self._wide.half]
         # Two half waves of the cut-off: samples farther away have little weight in the output.
         reach = min(self._narrow.half, round(1.0 / (self._narrow.cutoff * self._period)))

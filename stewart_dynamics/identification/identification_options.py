@@ -43,7 +43,8 @@ class DesignOptions(NamedTuple):
     """Largest displacement [m]; rotations: divided by the characteristic length."""
     center: tuple[float, ...] | None = None
     """Center of the motion, X Y Z alpha beta gamma [m, rad]; None: home."""
-    noise: float = 5.0  # standard deviation of the efforts [N], for the predicted intervals
+    noise: float | None = None
+    """Standard deviation of the efforts, for the predicted intervals; None: a usual one."""
     rate: float = 500.0  # rate of setpoints and measured efforts [Hz]
     cutoff: float = CUTOFF  # that of the identification [Hz]
     generations: int = 400

@@ -10,8 +10,10 @@ plotly.js is included, numbers are base64 of typed arrays.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
+import math
 from pathlib import Path
 import textwrap
 from typing import Any
@@ -30,10 +32,13 @@ from stewart_dynamics.identification.identify import (
 from stewart_dynamics.identification.lack_of_fit import NEXT, PIECE, WHOLE
 from stewart_dynamics.identification.parameter_fit import residual_of, shifted_by
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.legs import KINDS
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.least_squares import Identifiability, identifiability
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.statements import plural
+from stewart_dynamics.replay.summary import key_of
 from stewart_dynamics.reporting.estimates import (
     combined, estimate, IDENTIFIED, justified, NOT_IDENTIFIABLE, not_identifiable_lines,
     page_values, table_lines, WITHOUT_VALUE)
@@ -97,7 +102,9 @@ def _rounded(found: Identified) -> Parameters:
 
 def document(found: Identified, options: IdentificationOptions) -> dict[str, Any]:
     """Return the content of identification.json, see docs/identification.md."""
-    joints, u, asked = found.parameters.joints, found.unknowns, found.unknowns.asked
+    p, u, asked = found.parameters, found.unknowns, found.unknowns.asked
+    noise = key_of(f'noise_of_{p.leg_kind.position.field}', p.leg_kind.position.unit), key_of(
+        f'noise_of_{p.leg_kind.rate.field}', p.leg_kind.rate.unit)
     lack, what, states = found.lack_of_fit, *_identifiability(found)
     sure = all(lack is not None and each.what == lack.cause for each in found.likely)
     errors, parts = _errors(found), found.fit.parts(u)
@@ -112,7 +119,7 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
         'version': VERSION, 'software': SOFTWARE,
         'date': now(),
         'bags': [{
-            **bag._asdict(), 'bag': str(bag.bag),
+            **_renamed(bag._asdict(), noise), 'bag': str(bag.bag),
             'delay_s': delay + bag.delay_s if error > 0.0 else None,
             'delay_standard_error_s': error if error > 0.0 else None,
         } for bag, delay, error in zip(
@@ -128,10 +135,11 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
         'combinations': combined(
             what, [u.names[n] for n in asked], [u.units[n] for n in asked],
             found.fit.values[asked], found.fit.covariance[np.ix_(asked, asked)], unclear),
+        **_base_parameters(found, sure),
         'rank': what.rank, 'unknowns': len(asked), 'singular_values': what.singular_values,
-        'residuals': _residuals(joints, found.residuals),
+        'residuals': _residuals(p, found.residuals),
         'validation': None if found.validation is None else {
-            'samples': found.validation.samples, **_residuals(joints, found.validation)},
+            'samples': found.validation.samples, **_residuals(p, found.validation)},
         'tested_for_lack_of_fit': found.tested,
         'lack_of_fit': None if lack is None else {
             'cause': lack.cause, 'text': _notice(found, sure),
@@ -140,8 +148,37 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
                         'columns': each.columns, 'deviations': each.deviations}
                        for each in lack.ranked]},
         'likely_mistakes': [each._asdict() for each in found.likely],
-        'identified': found.parameters.plain(),
+        'identified': p.plain(),
     }
+
+
+def _renamed(bag: dict[str, Any], noise: tuple[str, str]) -> dict[str, Any]:
+    """Return the data of a bag with these names of the noise of positions and rates."""
+    names = dict(zip(('noise_of_positions', 'noise_of_rates'), noise, strict=True))
+    return {names.get(name, name): value for name, value in bag.items()}
+
+
+def _base_parameters(found: Identified, sure: bool) -> dict[str, Any]:
+    """Return estimates of ``LegKind.base_parameters`` that are uncertain, if there are any."""
+    u, p, fit = found.unknowns, found.parameters, found.fit
+    estimates: list[dict[str, Any]] = []
+    for each in p.leg_kind.base_parameters(p):
+        for leg, joint in enumerate(p.joints):
+            sums = np.zeros(len(u.start))
+            for name, coefficients in each.terms.items():
+                sums[u.names.index(f'{name}.{joint}')] = coefficients[leg]
+            before = float(np.linalg.norm(sums @ u.root))
+            if not before:
+                continue  # the file knows it exactly
+            shifts = 0.0 if found.lack_of_fit is None else float(
+                np.abs(sums) @ found.lack_of_fit.shifts) / TWO_SIDED
+            error = math.sqrt(max(float(sums @ fit.covariance @ sums), 0.0)) + shifts
+            state = IDENTIFIED if error < IDENTIFIABLE * before else NOT_IDENTIFIABLE
+            estimates.append({**estimate(
+                f'{each.name}.{joint}', each.unit, float(sums @ u.start),
+                float(sums @ fit.values), state, error, 0.0, False, sure, prior=True),
+                'file_deviation': before})
+    return {'base_parameters': estimates} if estimates else {}
 
 
 def _identifiability(found: Identified) -> tuple[Identifiability, list[str]]:
@@ -183,27 +220,43 @@ def _notice(found: Identified, sure: bool) -> str:
     return f'the residuals are more than noise: {cause}; {changes}; next: {NEXT[lack.cause]}'
 
 
-def _residuals(joints: Sequence[str], residuals: Residuals) -> dict[str, Any]:
+def _residuals(p: Parameters, residuals: Residuals) -> dict[str, Any]:
     """Return the residuals of each leg, and their RMS of all legs."""
-    rms = {'before_rms_n': residuals.before, 'after_rms_n': residuals.after,
-           'measured_rms_n': residuals.measured}
+    rms = dict(zip(_rms_keys(p.leg_kind), (
+        residuals.before, residuals.after, residuals.measured), strict=True))
     return {'legs': {joint: {key: values[leg] for key, values in rms.items()}
-                     for leg, joint in enumerate(joints)},
+                     for leg, joint in enumerate(p.joints)},
             **{key: np.sqrt(np.mean(values ** 2)) for key, values in rms.items()}}
+
+
+def _rms_keys(kind: LegKind) -> tuple[str, str, str]:
+    """Return keys of RMS residuals by the file and by identified parameters, and of efforts."""
+    before, after, measured = (key_of(f'{each}_rms', kind.effort.unit)
+                               for each in ('before', 'after', 'measured'))
+    return before, after, measured
+
+
+def _kind_in(result: Mapping[str, Any]) -> LegKind:
+    """Return the kind of legs of identification.json."""
+    return next(kind for kind in KINDS if _rms_keys(kind)[0] in result['residuals'])
 
 
 def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
     """Return the comments of identified.yaml by parameter: intervals and date."""
     texts: dict[str, list[str]] = {}
+    of_masses = {each.name: each.parameter for each in _kind_in(result).masses}
+    several = Counter(of_masses.values())
     for each in result['parameters']:
         parts = each['name'].split('.')
         name = '.'.join(parts[:2]) if parts[0] == 'platform' else '.'.join(parts[:-1])
-        name = name.replace('first_moment', 'center_of_mass').replace('second_moment', 'inertia')
+        of_mass, name = name, of_masses.get(name, name)
         if each['state'] == IDENTIFIED:
             text = (f'+-{TWO_SIDED * each["standard_error"]:.2g}' if each['interval'] else
                     'no interval')
             if name == 'gravity':  # the identified angle is not a value of the file
                 text = f'turned about {parts[1][-1]} by {each["value"]:.5f} {text} rad'
+            elif several[name] > 1:
+                text = f'{of_mass.split(".", 2)[2]} {text} {each["unit"]}'
         else:
             text = WITHOUT_VALUE[each['state']]
         texts.setdefault(name, []).append(text)
@@ -222,24 +275,36 @@ def result_text(result: Mapping[str, Any]) -> str:
         notice = textwrap.wrap(NOT_TESTED, 100)
     lines = [*notice, *_headline(result), '', *table_lines(result['parameters'], 'identified'),
              *not_identifiable_lines(result, 'motion')]
+    if base := _shown_base_parameters(result):
+        lines += ['', 'base parameters of the legs, which the efforts show by themselves:',
+                  *table_lines(base, 'identified')]
     lines += _bags(result)
     return '\n'.join(lines)
 
 
+def _shown_base_parameters(result: Mapping[str, Any]) -> list[Any]:
+    """Return base parameters if some of the masses in them were asked for."""
+    base: list[Any] = result.get('base_parameters', [])
+    kind = _kind_in(result)
+    inertial = kind.fields['reflected_mass'], *(each.name for each in kind.masses)
+    return base if any(each['name'].startswith(inertial) for each in result['parameters']) else []
+
+
 def _headline(result: Mapping[str, Any]) -> list[str]:
-    residuals = result['residuals']
-    lines = [f'residual RMS {residuals["before_rms_n"]:.4g} N by the file, '
-             f'{residuals["after_rms_n"]:.4g} N by the identified parameters '
-             f'({_percent(residuals["after_rms_n"], residuals["measured_rms_n"])} of the efforts)']
+    residuals, kind = result['residuals'], _kind_in(result)
+    (before, after, measured), unit = _rms_keys(kind), kind.effort.unit
+    lines = [f'residual RMS {residuals[before]:.4g} {unit} by the file, '
+             f'{residuals[after]:.4g} {unit} by the identified parameters '
+             f'({_percent(residuals[after], residuals[measured])} of the efforts)']
     held = result['validation']
     if held is None:
         lines.append('not validated: too little data to hold some out')
     else:
-        worst = max(held['legs'], key=lambda leg: held['legs'][leg]['after_rms_n'])
+        worst = max(held['legs'], key=lambda leg: held['legs'][leg][after])
         lines.append(
-            f'on held-out time: {held["before_rms_n"]:.4g} N by the file, '
-            f'{held["after_rms_n"]:.4g} N by a fit to the rest; worst leg {worst}, '
-            f'{held["legs"][worst]["after_rms_n"]:.4g} N')
+            f'on held-out time: {held[before]:.4g} {unit} by the file, '
+            f'{held[after]:.4g} {unit} by a fit to the rest; worst leg {worst}, '
+            f'{held["legs"][worst][after]:.4g} {unit}')
     return lines
 
 
@@ -248,7 +313,7 @@ def _percent(part: float, whole: float) -> str:
 
 
 def _bags(result: Mapping[str, Any]) -> list[str]:
-    lines = ['']
+    lines, effort = [''], _kind_in(result).effort.name
     for bag in result['bags']:
         delay = '' if bag['delay_s'] is None else (
             f', efforts {1e3 * abs(bag["delay_s"]):.2f} +- '
@@ -257,7 +322,8 @@ def _bags(result: Mapping[str, Any]) -> list[str]:
         lines.append(f'{bag["bag"]}: {plural(bag["samples"], "sample")} in '
                      f'{bag["seconds"]:.1f} s of {bag["legs"]}{delay}')
         left = [(bag['samples_outliers'], 'wild value', 'replaced'),
-                (bag['samples_at_stops'], 'sample', 'at an end stop or force limit left out'),
+                (bag['samples_at_stops'], 'sample',
+                 f'at an end stop or {effort} limit left out'),
                 (bag['pieces_left_out'], 'piece', 'between gaps too short for the filters')]
         lines += [f'  {plural(number, what)} {why}' for number, what, why in left if number]
         lines += [f'  {plural(number, "message")} rejected: {why}'
@@ -276,14 +342,19 @@ def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapp
     """Write the page of a result, with the content of identification.json."""
     legs = list(found.parameters.joints)
     curves, spectra = _curves(extracts, found)
+    kind = found.parameters.leg_kind
     data = {'legs': legs, 'curves': [base64_of(column, '<f4') for column in curves.T],
-            'spectra': spectra, 'first': int(np.argmax(found.residuals.after))}
+            'spectra': spectra, 'first': int(np.argmax(found.residuals.after)),
+            'effort': kind.effort.name, 'unit': kind.effort.unit, 'rate': kind.rate.name,
+            'rate_unit': kind.rate.unit}
+    base = page_values({'parameters': _shown_base_parameters(result), 'combinations': []})
     script = plotly_script()
     bag = result['bags'][0]['bag']
     text = page(
         _TEMPLATES, 'identification', [script], document=True, r=result,
         name=Path(bag).name or bag, **page_values(result), legs=legs, plotly=script, data=data,
-        two_sided=TWO_SIDED, samples=len(curves), most=_MOST, not_tested=NOT_TESTED)
+        two_sided=TWO_SIDED, samples=len(curves), most=_MOST, not_tested=NOT_TESTED, kind=kind,
+        rms=_rms_keys(kind), key_of=key_of, base_parameters=base['parameters'])
     write_files({path: text})
 
 

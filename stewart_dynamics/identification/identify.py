@@ -37,7 +37,6 @@ from stewart_dynamics.identification.recording_mistakes import (
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.window_poses import first_pose
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.drives.measured_efforts import FAR, force_per_effort
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
@@ -72,7 +71,7 @@ def _used(extract: Extract) -> Flags:
 
 
 class BagRead(NamedTuple):
-    """Data of a bag that was read, besides its extracts, by the names of identification.json."""
+    """Data of a bag that was read, besides its extracts, by names of identification.json."""
 
     bag: Path
     samples: int
@@ -83,8 +82,8 @@ class BagRead(NamedTuple):
     pieces_left_out: int  # number of windows between gaps that are too short for the filters
     samples_at_stops: int
     samples_outliers: int
-    noise_of_lengths_m: float
-    noise_of_rates_m_s: float | None
+    noise_of_positions: float
+    noise_of_rates: float | None
     delay_s: float
     """Time by which the efforts were shifted beforehand; delays of the fit are added."""
     rejected: dict[str, int]
@@ -95,7 +94,7 @@ class BagRead(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Residuals by the file's and by written parameters, and efforts: RMS per leg (6,) [N]."""
+    """Residuals by the file's and by written parameters, and efforts: RMS per leg (6,)."""
 
     before: Array
     after: Array
@@ -177,11 +176,11 @@ class _Bag:
 
     def result(self, last: WindowRead) -> BagRead:
         """Return the data of the bag, with the noise of the last window."""
-        of_lengths, of_rates = last.deviations
+        of_positions, of_rates = last.deviations
         return BagRead(
             self.path, self.counts['samples'], (self.end - self.begin) * NANOSECOND, self.period,
             self.extraction.cutoff, self.rates, self.counts['left out'], self.counts['stops'],
-            self.counts['outliers'], of_lengths, of_rates if self.rates else None,
+            self.counts['outliers'], of_positions, of_rates if self.rates else None,
             self.lag * self.period + self.extraction.later, {}, [], self.notices)
 
 
@@ -189,7 +188,6 @@ class Identification:
     """Reads bags and identifies parameters, beginning with those of the file."""
 
     def __init__(self, parameters: Parameters, options: IdentificationOptions) -> None:
-        require_kind(parameters, 'identification')
         if parameters.base.source != FIXED:
             raise ParameterError(
                 f'base.source: {parameters.base.source}: hexapods are identified on a base at '
@@ -387,11 +385,14 @@ class Identification:
         likely = list(of_efforts(Comparison(extracts, unknowns, whole=not usable),
                                  self.parameters, self._per_effort is not None))
         if not usable:
+            kind = self.parameters.leg_kind
             reasons = [f'likely mistake: {each.text}' for each in likely] or [
-                'is geometry.zero_length right, and are the efforts in N?']
+                f'is {kind.zero_cause.subject} right, and are the efforts in {kind.effort.unit}?']
+            low, *others = *kind.position_limits, kind.effort_limit
+            names = ', '.join([low, *(each.rpartition('.')[2] for each in others[:-1])])
             raise BagError(f'{self.bags[0].bag}: nothing to identify from: '
                            f'{sum(bag.samples_at_stops for bag in self.bags)} samples are at or '
-                           'beyond limits.length_min, length_max or force_max: '
+                           f'beyond {names} or {others[-1].rpartition(".")[2]}: '
                            + '; '.join(reasons))
         unsound = 6 * extracts.samples - int(np.sum(counts))
         outliers = 0 if likely else self._leave_out()
@@ -494,7 +495,8 @@ class Identification:
         written = Residuals.of(extracts, unknowns, best_for_file(
             extracts, self.parameters, self._options.kinds, self._cutoffs,
             found.ratios(unknowns), rest), found.delays, held_out)
-        if not list(of_validation(written.before, written.after, written.measured, 0.0)):
+        unit = self.parameters.leg_kind.effort.unit
+        if not list(of_validation(written.before, written.after, written.measured, 0.0, unit)):
             return written, []
         whole = fit(extracts, unknowns, noisy, self._cutoffs, rest)
         slow = self.parameters.actuator.coulomb_velocity
@@ -505,7 +507,8 @@ class Identification:
 
         end = Residuals.of(extracts, unknowns, whole.values, whole.delays, sliding)
         deviation = whole.of_prediction(extracts, unknowns, sliding)
-        return written, list(of_validation(end.before, end.after, end.measured, deviation))
+        return written, list(of_validation(
+            end.before, end.after, end.measured, deviation, unit))
 
     def close(self) -> None:
         """Remove the temporary file."""

@@ -16,7 +16,7 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.estimation.confidence_level import INTERVAL
 from stewart_dynamics.identification.identification_options import (
     CUTOFF, DesignOptions, IdentificationOptions)
-from stewart_dynamics.identification.unknowns import DEFAULT, KINDS, LINEAR_UNKNOWNS, PLATFORM
+from stewart_dynamics.identification.unknowns import DEFAULT, KINDS, PLATFORM
 from stewart_dynamics.program import (
     add_accepted, add_motor_efforts, add_node, add_parameters, add_report, arguments_of, between,
     DONE, names_of, Program, share, whole)
@@ -66,7 +66,8 @@ def _arguments() -> argparse.ArgumentParser:
     what = parser.add_argument_group('what is identified, and how')
     what.add_argument('--identify', dest='kinds', type=_kinds, default=DEFAULT, metavar='LIST',
                       help=f'of {", ".join(KINDS)}, with commas (default: {",".join(DEFAULT)}); '
-                           'tilt is the direction of gravity, for a base that is not level')
+                           'parts of the legs that the hexapod has; tilt is the direction of '
+                           'gravity, for a base that is not level')
     add_motor_efforts(what)
     what.add_argument('--cutoff', type=between(0.1, 1000.0), default=CUTOFF, metavar='HZ',
                       help='cut-off frequency of the filter on both sides of the regression '
@@ -103,8 +104,9 @@ def _add_design(parser: argparse.ArgumentParser) -> None:
                        help='pose about which it moves, where it begins and ends [m, rad] '
                             '(default: home)')
     group.add_argument('--noise', type=between(1e-9, 1e9), metavar='N',
-                       help='standard deviation of the measured efforts, for the predicted '
-                            'intervals (default: %(default)g)')
+                       help='standard deviation of the measured efforts [N, N m], for the '
+                            'predicted intervals (default: 5 N, of torques a hundredth of those '
+                            'that hold the platform)')
     group.add_argument('--rate', type=between(1.0, 1e4), metavar='HZ',
                        help='of setpoints and measured efforts (default: %(default)g)')
     group.add_argument('--generations', type=whole(1, 100000), metavar='N',
@@ -118,14 +120,12 @@ def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import find_bags
     from stewart_dynamics.identification.identification_results import result_text, run
-    from stewart_dynamics.legs import require_kind
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes, mistakes_in_options
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
     options = IdentificationOptions(**arguments_of(given, IdentificationOptions._fields))
     parameters = Parameters.from_yaml(given.params, given.node)
-    require_kind(parameters, 'identification')
     if given.design:
         for mistake in mistakes_in_options(parameters, {'--center': given.center}, {}):
             _PROGRAM.complain(f'warning: {mistake}')
@@ -184,7 +184,7 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
     with tqdm(total=asked.generations, disable=None, leave=False, dynamic_ncols=True,
               bar_format='{percentage:3.0f}%|{bar}| designing, {remaining} left') as bar:
         designed = design(parameters, asked, progress)
-    lines = list(_design_lines(designed, asked))
+    lines = list(_design_lines(designed, asked, parameters))
     with whole_folder(folder, options, DESIGNED_MOTION, before) as partial:
         path = partial / DESIGNED_MOTION
         given_values = designed.trajectory.given
@@ -196,15 +196,19 @@ def _design(given: argparse.Namespace, parameters: Parameters) -> None:
         'stewart_trajectory', '--ros-args', '--params-file', str(folder / DESIGNED_MOTION)])]))
 
 
-def _design_lines(designed: Design, asked: DesignOptions) -> Iterator[str]:
+def _design_lines(designed: Design, asked: DesignOptions, parameters: Parameters,
+                  ) -> Iterator[str]:
     """Yield predicted intervals, of the six legs the widest, and the use of the limits."""
-    yield (f'predicted {INTERVAL}s: {asked.duration:g} s, white noise of {asked.noise:g} N in '
-           f'efforts at {asked.rate:g} Hz')
+    from stewart_dynamics.identification.motion_design import noise_of
+
+    noise = float(f'{noise_of(asked, parameters):.3g}')
+    yield (f'predicted {INTERVAL}s: {asked.duration:g} s, white noise of {noise:g} '
+           f'{parameters.leg_kind.effort.unit} in efforts at {asked.rate:g} Hz')
     unknowns = designed.unknowns
     of_legs: dict[str, tuple[float, str]] = {}
     for n, half in zip(unknowns.asked, designed.half_widths, strict=True):
         name, unit = unknowns.names[n], unknowns.units[n]
-        if PLATFORM <= n < LINEAR_UNKNOWNS:  # the name of a leg's ends with the name of the leg
+        if PLATFORM <= n < unknowns.count:  # the name of a leg's ends with the name of the leg
             name = name.rpartition('.')[0]
         of_legs[name] = max(of_legs.get(name, (0.0, unit)), (float(half), unit))
     for name, (half, unit) in of_legs.items():

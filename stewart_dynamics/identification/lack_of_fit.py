@@ -37,6 +37,8 @@ from stewart_dynamics.identification.extraction import BAND, Extract, Extracts, 
 from stewart_dynamics.identification.parameter_fit import (
     directions, Fit, least_deviation, Noisy, residual_of)
 from stewart_dynamics.identification.unknowns import ORIGINS, Unknowns
+from stewart_dynamics.legs import KINDS
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Maximum number of extracts that are tested.
@@ -121,7 +123,7 @@ NEXT = {
     'payload': 'identify the part with one payload, each bag by itself',
     'stribeck_friction': 'record a motion that is slow for a smaller part of its time',
     'load_friction': 'if efforts follow from motors, give drive.efficiency and --motor-torque',
-    'zero_length': _GEOMETRY, 'joint': _GEOMETRY,
+    **{kind.zero_cause.what: _GEOMETRY for kind in KINDS}, 'joint': _GEOMETRY,
     UNKNOWN: 'look at this part in the report, and compare with a recording of another motion '
              '(--design --seed 1)'}
 
@@ -216,7 +218,7 @@ def lack_of_fit(platform: StewartPlatform, extracts: Extracts, noisy: Noisy, unk
     """
     numbers = long_pieces(extracts) or range(len(extracts))
     chosen = list(_selected(numbers, len(numbers)))
-    contradicted = list(_contradicted(unknowns, fit))
+    contradicted = list(_contradicted(platform.parameters.leg_kind, unknowns, fit))
     ranked: list[Found] = []
     try:
         for geometry in False, True:
@@ -270,7 +272,7 @@ def _model_error(causes: Sequence[Cause], scores: _Scores, unknowns: Unknowns, n
     return shifts
 
 
-def _contradicted(unknowns: Unknowns, fit: Fit) -> Iterator[tuple[Found, Array]]:
+def _contradicted(kind: LegKind, unknowns: Unknowns, fit: Fit) -> Iterator[tuple[Found, Array]]:
     """
     Yield kinds of numbers that are farther from the file than their uncertainty allows.
 
@@ -281,8 +283,9 @@ def _contradicted(unknowns: Unknowns, fit: Fit) -> Iterator[tuple[Found, Array]]
         if found.significance > UNCERTAIN:
             change = unknowns.root[:, found.places] @ found.true
             shift = found.shift(fit.posterior)[:len(unknowns.start)]
-            yield Found(what, _in_words(unknowns, what, change), found.statistic, found.freedom,
-                        found.significance, _NONE), np.abs(unknowns.root @ shift)
+            words = _in_words(kind, unknowns, what, change)
+            yield Found(what, words, found.statistic, found.freedom, found.significance, _NONE,
+                        ), np.abs(unknowns.root @ shift)
 
 
 def _rivals(best: Found, causes: Iterable[Cause], scores: _Scores, unknowns: Unknowns,
@@ -303,18 +306,20 @@ def _places_of(unknowns: Unknowns, what: str) -> Integers:
     return places
 
 
-def _in_words(unknowns: Unknowns, what: str, change: Array) -> str:
+def _in_words(kind: LegKind, unknowns: Unknowns, what: str, change: Array) -> str:
     """Return a change (k,) of the file's values in words."""
     if what == 'tilt':
         return f'a base tilted by {math.degrees(math.hypot(*change[-3:-1])):.3g} degrees'
     if what == 'reflected_mass':
+        reflected = kind.fields['reflected_mass']
         of_rotors = [f'{each:+.3g}' for each, name in zip(change, unknowns.names, strict=True)
-                     if what in name]
-        return f'another actuator.reflected_mass, {" ".join(of_rotors)} kg'
+                     if reflected in name]
+        return f'another {reflected}, {" ".join(of_rotors)} {kind.inertia_unit}'
     if what == 'effort_gain':
         return f'another gain of all efforts, by about {100.0 * change[-1]:+.2g} %'
     parts = [100.0 * each / start for each, start, name in zip(
-        change, unknowns.start, unknowns.names, strict=True) if 'second_moment' in name and start]
+        change, unknowns.start, unknowns.names, strict=True)
+        if name.startswith(kind.weights) and start]
     return f'other masses of the legs, by about {np.mean(parts):+.3g} %'
 
 

@@ -32,12 +32,9 @@ from stewart_dynamics.identification.identification_options import DesignOptions
 from stewart_dynamics.identification.parameter_fit import (
     covariance_of, delay_deviations, directions)
 from stewart_dynamics.identification.unknowns import regressor_of, Unknowns
-from stewart_dynamics.legs import require_kind
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.limits import (
-    CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, LIMITS, OF_JOINTS, OF_LOADS, OF_RATES, OF_RESULTS,
-    USUAL)
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, LIMITS, limits_of, OF_JOINTS
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
 from stewart_dynamics.mechanics.rows import (
     CONDITION, MOTION, POSE, POSITION, ROTATION)
@@ -47,9 +44,10 @@ from stewart_dynamics.reference_motion.motion_functions import motion_at
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
 
-# Margins, as fractions of the stroke (at each end), rates, forces, and of joint angles and
-# clearance: the masses are not known yet, and a controller overshoots.
-_STROKE, _RATE, _FORCE, _ANGLE = 0.02, 0.1, 0.2, 0.1
+# Margins, as fractions of the stroke (at each end), rates, efforts, and of joint angles and
+# clearance: the masses are not known yet, and a controller overshoots. Margin of the ratio of a
+# lever to its largest value: rates grow without bound where it is zero.
+_STROKE, _RATE, _FORCE, _ANGLE, _LEVER = 0.02, 0.1, 0.2, 0.1, 0.1
 # Largest condition number, relative to singularity.warn_condition.
 _CONDITION = 0.5
 _WARN_CONDITION = 'singularity.warn_condition'
@@ -68,7 +66,7 @@ class DesignLimits:
     def __init__(self, platform: StewartPlatform, amplitude: float | None = None,
                  center: Sequence[float] | None = None) -> None:
         p = platform.parameters
-        missing = [name for name in USUAL if p[name] is None]
+        missing = [name for name in limits_of(p).usual if p[name] is None]
         if missing and amplitude is None:
             raise ParameterError(
                 f'{", ".join(missing)}: missing: a motion is designed within the limits of the '
@@ -121,11 +119,11 @@ class DesignLimits:
 
     def _values(self, rows: Array) -> dict[str, Array]:
         """Return the values (M, N, ...) that each limit bounds, for motions (M, N, MOTION)."""
-        motions = rows.reshape(-1, MOTION)
+        motions, names = rows.reshape(-1, MOTION), limits_of(self._platform.parameters)
         results = self._platform.solve(motions)
         found = {**self._limits.values(motions, results),
                  **{name: np.abs(results[:, LIMITS[name].columns])
-                    for name in (*OF_RATES, *OF_LOADS)},
+                    for name in (*names.rates, *names.loads)},
                  _WARN_CONDITION: results[:, CONDITION, None]}
         if CLEARANCE_MIN in found:
             found[CLEARANCE_MIN] = found[CLEARANCE_MIN].min(axis=1, keepdims=True)
@@ -134,14 +132,17 @@ class DesignLimits:
 
 def _bounds(p: Parameters) -> dict[str, Any]:
     """Return the limits less their margins; infinite if not given."""
+    kind, names = p.leg_kind, limits_of(p)
     given = {name: np.full(6, -np.inf if LIMITS[name].minimum else np.inf) if p[name] is None
-             else p[name] for name in OF_RESULTS}
-    low, high = given[LENGTH_MIN], given[LENGTH_MAX]
+             else p[name] for name in names.results}
+    low, high = (given[name] for name in kind.position_limits)
     stroke = np.where(np.isfinite(high - low), high - low, 0.0)
+    ends = dict(zip(kind.position_limits, (
+        low + _STROKE * stroke, high - _STROKE * stroke), strict=True))
     return {
-        LENGTH_MIN: low + _STROKE * stroke, LENGTH_MAX: high - _STROKE * stroke,
-        **{name: (1.0 - _RATE) * given[name] for name in OF_RATES},
-        **{name: (1.0 - _FORCE) * given[name] for name in OF_LOADS},
+        **ends, **({kind.lever_limit: p[kind.lever_limit] + _LEVER} if kind.lever_limit else {}),
+        **{name: (1.0 - _RATE) * given[name] for name in names.rates},
+        **{name: (1.0 - _FORCE) * given[name] for name in names.loads},
         _WARN_CONDITION: _CONDITION * p.singularity.warn_condition,
         **{name: (1.0 - _ANGLE) * p[name] for name in OF_JOINTS if p[name] is not None},
         CLEARANCE_MIN: (1.0 + _ANGLE) * (p.limits.leg_clearance_min or 0.0)}
@@ -176,7 +177,6 @@ def design(parameters: Parameters, options: DesignOptions,
     parameter is not identifiable from any motion, a limit is missing, or the center is not within
     the limits.
     """
-    require_kind(parameters, 'identification')
     search = _Search(parameters, options)
     best = _evolution(search.costs, search.size, options, progress)
     trajectory = search.trajectory(best)
@@ -212,6 +212,11 @@ def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion:
     return half_widths
 
 
+def noise_of(options: DesignOptions, p: Parameters) -> float:
+    """Return the standard deviation of the measured efforts."""
+    return p.leg_kind.effort_noise(p) if options.noise is None else options.noise
+
+
 def _variances(platform: StewartPlatform, unknowns: Unknowns, rows: Array, seconds: float,
                options: DesignOptions) -> Array:
     """Return the variances (M, a) of the asked unknowns after motions (M, N, MOTION)."""
@@ -224,11 +229,15 @@ def _variances(platform: StewartPlatform, unknowns: Unknowns, rows: Array, secon
     columns = np.concatenate([regressor, efforts], axis=-1) @ directions(
         unknowns, unknowns.start, np.zeros(1), 0, delay_deviations(np.array([options.cutoff])))
     left = 1.0 - 2.0 * time_for_filters(options.cutoff) / seconds
-    columns *= math.sqrt(max(left, 0.0) * step * options.rate) / options.noise
+    columns *= math.sqrt(max(left, 0.0) * step * options.rate) / noise_of(
+        options, platform.parameters)
     zeros = np.zeros((columns.shape[-1], columns.shape[-1]))
-    found = (posterior(gram_of(spectra_of(each, BAND * SAMPLES * options.cutoff * step)),
-                       zeros[0], zeros[0], zeros) for each in columns)
-    return np.array([np.diag(covariance_of(unknowns, each))[unknowns.asked] for each in found])
+    variances = np.full((count, len(unknowns.asked)), np.inf)  # where the hexapod does not reach
+    for n in np.flatnonzero(np.isfinite(columns).all(axis=(1, 2, 3))):
+        found = posterior(gram_of(spectra_of(columns[n], BAND * SAMPLES * options.cutoff * step)),
+                          zeros[0], zeros[0], zeros)
+        variances[n] = np.diag(covariance_of(unknowns, found))[unknowns.asked]
+    return variances
 
 
 class _Search:

@@ -23,7 +23,7 @@ from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.identification.extraction import Extract, Extraction, ORDERS
 from stewart_dynamics.identification.lack_of_fit import LackOfFit, LEFT_BY_FILTERS
 from stewart_dynamics.identification.parameter_fit import Fit, residual_of, shifted_by
-from stewart_dynamics.identification.unknowns import COULOMB_COLUMNS, regressor_of, Unknowns
+from stewart_dynamics.identification.unknowns import regressor_of, Unknowns
 from stewart_dynamics.identification.window_poses import first_pose, motions, pose_near, poses
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.measured_efforts import (
@@ -53,7 +53,7 @@ _PIECE = 50.0
 # Largest delay of the efforts that is estimated [s]: delays come from buses and computers, and do
 # not scale with the hexapod.
 LONGEST_LAG = 0.1
-# Tolerance of limits of length, relative to them.
+# Tolerance of limits of positions, relative to them.
 _TOLERANCE = 1e-3
 
 
@@ -118,18 +118,22 @@ class Comparison:
 
 
 def of_no_pose(p: Parameters, positions: Array) -> str:
-    """Return the likely reason why no pose has the measured lengths."""
-    lengths = positions + p.geometry.zero_length
-    low, high = lengths.min(), lengths.max()
-    text = (f'the measured lengths belong to no pose of this hexapod: with geometry.zero_length '
-            f'they are {low:.4g} to {high:.4g} m')
-    least, most = p.limits.length_min, p.limits.length_max
+    """Return the likely reason why no pose has the measured positions."""
+    kind = p.leg_kind
+    there = positions + p.geometry.zero_length
+    low, high = there.min(), there.max()
+    added = f'with {kind.zero} ' if kind.zero else ''
+    text = (f'the measured {kind.position.field} belong to no pose of this hexapod: {added}'
+            f'they are {low:.4g} to {high:.4g} {kind.position.unit}')
+    least, most = (p[name] for name in kind.position_limits)
     if least is not None and most is not None and (
-            low < (1.0 - _TOLERANCE) * least.min() or high > (1.0 + _TOLERANCE) * most.max()):
-        return (f'{text}, and limits.length_min and length_max are {least.min():g} and '
-                f'{most.max():g} m: likely geometry.zero_length is wrong, or positions are in '
-                'another unit')
-    return f'{text}: likely geometry.zero_length or the geometry is wrong, or legs are swapped'
+            low < least.min() - _TOLERANCE * abs(least.min())
+            or high > most.max() + _TOLERANCE * abs(most.max())):
+        names = kind.position_limits[0], kind.position_limits[1].rpartition('.')[2]
+        return (f'{text}, and {" and ".join(names)} are {least.min():g} and '
+                f'{most.max():g} {kind.position.unit}: likely {kind.zero_cause.subject} is '
+                'wrong, or positions are in another unit')
+    return f'{text}: likely {kind.zero_cause.no_pose}'
 
 
 def of_delay(delays: Iterable[float]) -> Iterator[LikelyMistake]:
@@ -180,7 +184,7 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
     with suppress(PoseError, SingularityError):
         tried = [(each(piece, first_pose(platform, piece)).extract, delay)
                  for each, delay in ((extraction, fit.delays[0]), (undelayed, 0.0))]
-        own = [_of_legs(platform, extract, _LEGS) for extract, _ in tried]
+        own = [_of_legs(platform, extract, _LEGS, unknowns) for extract, _ in tried]
         now = _misfit(own[0], _LEGS, unknowns, fit.delays[0])
         swaps = [each for each in _swaps(platform, tried, own, unknowns)
                  if now - each[0] > _CLEARLY and each[0] < (min(_BETTER, left) ** 2) * now]
@@ -191,28 +195,30 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
             f'residual becomes {math.sqrt(misfit / now):.2f} times as large')
     elif late:
         yield from late
-    elif lack is not None and lack.cause == 'zero_length' and lack.ranked[0].columns == 6:
-        yield LikelyMistake(lack.cause, f'geometry.zero_length looks wrong: {lack.text}')
+    elif (lack is not None and lack.cause == p.leg_kind.zero_cause.what
+          and lack.ranked[0].columns == 6):
+        yield LikelyMistake(
+            lack.cause, f'{p.leg_kind.zero_cause.subject} looks wrong: {lack.text}')
     elif residual > _UNEXPLAINED:
         yield LikelyMistake(
             'misfit', f'the residual is {100.0 * residual:.0f} % of the efforts whatever the '
             'parameters: positions and efforts may not belong together, or the geometry is wrong')
 
 
-def of_validation(before: Array, after: Array, measured: Array, deviation: float,
+def of_validation(before: Array, after: Array, measured: Array, deviation: float, unit: str,
                   ) -> Iterator[LikelyMistake]:
     """
     Yield a likely mistake if the file predicts held-out efforts better than the fit.
 
-    ``deviation``: of the fit's prediction [N], RMS; twice as much is no reason.
+    ``deviation``: of the fit's prediction, RMS; twice as much is no reason. ``unit``: of efforts.
     """
     file, fitted, size = (math.sqrt(float(np.mean(each ** 2))) for each in (
         before, after, measured))
     if fitted > math.hypot(_WORSE * file + LEFT_BY_FILTERS * size, 2.0 * deviation):
         yield LikelyMistake(
-            'validation', f'on held-out time the residual is {file:.3g} N by the file and '
-            f'{fitted:.3g} N by a fit to the rest: the file is better; the model does not hold in '
-            'a part of the recording')
+            'validation', f'on held-out time the residual is {file:.3g} {unit} by the file and '
+            f'{fitted:.3g} {unit} by a fit to the rest: the file is better; the model does not '
+            'hold in a part of the recording')
 
 
 def most_motion(window: Window, extraction: Extraction, longer: float = 0.0) -> Window:
@@ -237,14 +243,15 @@ def _swaps(platform: StewartPlatform, tried: Sequence[tuple[Extract, float]],
     for a, b in combinations(range(6), 2):
         order = list(_LEGS)
         order[a], order[b] = b, a
-        others = [_of_legs(platform, extract, order) for extract, _ in tried]
+        others = [_of_legs(platform, extract, order, unknowns) for extract, _ in tried]
         for which, extracts, of_efforts in (('positions and efforts', others, order),
                                             ('efforts', own, order), ('positions', others, _LEGS)):
             yield min(_misfit(extract, of_efforts, unknowns, delay) for extract, (_, delay) in zip(
                 extracts, tried, strict=True)), which, a, b
 
 
-def _of_legs(platform: StewartPlatform, extract: Extract, order: Sequence[int]) -> Extract | None:
+def _of_legs(platform: StewartPlatform, extract: Extract, order: Sequence[int],
+             unknowns: Unknowns) -> Extract | None:
     """
     Return an extract with positions of other legs; None if they have no poses.
 
@@ -260,7 +267,7 @@ def _of_legs(platform: StewartPlatform, extract: Extract, order: Sequence[int]) 
     except (PoseError, SingularityError):
         return None
     regressor = regressor_of(platform, motions(platform, found, legs[..., 1], legs[..., 2]))
-    regressor[:, _LEGS, COULOMB_COLUMNS] = extract.slip[:, order, 0]
+    regressor[:, _LEGS, unknowns.columns.coulomb] = extract.slip[:, order, 0]
     return extract._replace(columns=np.concatenate([regressor, extract.efforts], axis=-1))
 
 

@@ -20,19 +20,20 @@ of any size.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.estimation.uncertainty import root_of_covariance
+from stewart_dynamics.legs import KINDS as LEG_KINDS
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
-    about_origin, BODY_UNITS, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND,
-    FIRST_MOMENT, inertial_derivative, inertial_parameters, LINEAR, linear_parameters, names_of,
-    OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, UNITS,
-    VISCOUS_FRICTION)
+    about_origin, BODY_UNITS, FIRST_MOMENT, inertial_derivative, inertial_parameters,
+    linear_parameters, mass_places, names_of, parameter_values, Places, units_of)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import table
 from stewart_dynamics.parameters.body import Body
@@ -46,31 +47,63 @@ PLATFORM = 10
 
 _OF_PLATFORM = {'mass': (MASS,), 'center_of_mass': (CENTER,), 'inertia': (INERTIA,),
                 'platform': (MASS, CENTER, INERTIA)}
-_OF_LEGS = {'cylinder': (CYLINDER_FIRST, CYLINDER_SECOND),
-            'piston': (PISTON_MASS, PISTON_FIRST, PISTON_SECOND),
-            'reflected_mass': (REFLECTED_MASS,), 'viscous_friction': (VISCOUS_FRICTION,),
-            'coulomb_friction': (COULOMB_FRICTION,),
-            'friction': (VISCOUS_FRICTION, COULOMB_FRICTION), 'offset': (OFFSET,)}
 TILT = 'tilt'
-KINDS = (*_OF_PLATFORM, *_OF_LEGS, TILT)  # values that --identify accepts
+
+
+@cache
+def leg_values(kind: LegKind) -> dict[str, tuple[slice, ...]]:
+    """Return the values that --identify accepts of a kind of legs, and where theta has them."""
+    places, reflected = Places.of(kind), kind.fields['reflected_mass'].rpartition('.')[2]
+    friction = places.viscous_friction, places.coulomb_friction
+    return {
+        **{part: tuple(mass_places(kind, each.name) for each in kind.masses
+                       if each.part == part and each.acts) for part in kind.bodies},
+        reflected: (places.reflected_mass,), 'viscous_friction': friction[:1],
+        'coulomb_friction': friction[1:], 'friction': friction, 'offset': (places.offset,)}
+
+
+KINDS = (*_OF_PLATFORM, *dict.fromkeys(sorted(
+    (name for kind in LEG_KINDS for name in leg_values(kind)),
+    key=lambda name: all(name in leg_values(kind) for kind in LEG_KINDS))), TILT)
+"""Values that --identify accepts, those of one kind of legs alone before those of all."""
 DEFAULT = ('platform', 'viscous_friction', 'coulomb_friction')
 
-# The linear parameters that are uncertain; the mass of a cylinder alone changes no force.
-_LINEAR = np.delete(np.arange(LINEAR), CYLINDER_MASS)
-# Among them those whose forces depend on gravity.
-_WEIGHING = np.flatnonzero(np.isin(_LINEAR, np.concatenate([[0], *(
-    np.arange(LINEAR)[part] for part in (
-        FIRST_MOMENT, CYLINDER_FIRST, PISTON_MASS, PISTON_FIRST))])))
-LINEAR_UNKNOWNS = len(_LINEAR)
-COULOMB_COLUMNS = np.searchsorted(_LINEAR, np.arange(LINEAR)[COULOMB_FRICTION])
-"""Indices (6,) of the columns of Coulomb friction in the regressor."""
 # Origins of the uncertainty: ``uncertainty.*``, friction, and offsets of the efforts.
 ORIGINS = ('platform_mass', 'center_of_mass', 'inertia', 'leg_mass', 'reflected_mass', 'friction',
            'offset', 'tilt', 'effort_gain')
-_ORIGIN_OF = np.full(LINEAR, 3)
-for _origin, _part in ((0, MASS), (1, CENTER), (2, INERTIA), (4, REFLECTED_MASS),
-                       (5, VISCOUS_FRICTION), (5, COULOMB_FRICTION), (6, OFFSET)):
-    _ORIGIN_OF[_part] = _origin
+_OF_MASSES, _OF_ROTORS, _OF_FRICTION, _OF_OFFSETS = (
+    ORIGINS.index(name) for name in ('leg_mass', 'reflected_mass', 'friction', 'offset'))
+
+
+class Columns(NamedTuple):
+    """The linear parameters of hexapods with a kind of legs that are uncertain."""
+
+    linear: Integers  # those that act on efforts, among theta (m,)
+    weighing: Integers  # among these, those whose efforts depend on gravity
+    coulomb: Integers  # among these, Coulomb friction (6,)
+    origins: Integers  # of each, among ORIGINS (m,)
+
+    @classmethod
+    @cache
+    def of(cls, kind: LegKind) -> Columns:
+        """Return those of a kind."""
+        places = Places.of(kind)
+        rest = [False] * (places.whole - places.masses.stop)
+        acts, weighs = (np.repeat(flags, 6) for flags in (
+            [each.acts for each in kind.masses], [each.weighs for each in kind.masses]))
+        linear: Integers = np.flatnonzero(np.r_[[True] * PLATFORM, acts, np.logical_not(rest)])
+        weighing = np.r_[np.arange(PLATFORM) < FIRST_MOMENT.stop, weighs, rest]
+        origins = np.full(places.whole, _OF_MASSES)
+        for origin, part in enumerate((MASS, CENTER, INERTIA)):
+            origins[part] = origin
+        for origin, part in ((_OF_ROTORS, places.reflected_mass), (_OF_OFFSETS, places.offset),
+                             (_OF_FRICTION, places.viscous_friction),
+                             (_OF_FRICTION, places.coulomb_friction)):
+            origins[part] = origin
+        return cls(linear, np.flatnonzero(weighing[linear]),
+                   np.flatnonzero(np.isin(linear, np.r_[places.coulomb_friction])),
+                   origins[linear])
+
 
 _LEAST_MASS = 1e-9  # relative to the file's, where the prior judges it
 # Acceleration at which the scale of inertial effects equals a leg's share of the weight [m/s^2].
@@ -128,34 +161,50 @@ class Unknowns:
     def __init__(self, parameters: Parameters, kinds: Sequence[str] = DEFAULT,
                  known: Flags | None = None) -> None:
         self._parameters = p = parameters
-        self._theta = linear_parameters(p)
+        self._kind = kind = p.leg_kind
+        self._check(kinds)
+        self._theta, places = linear_parameters(p), Places.of(kind)
+        self.columns = Columns.of(kind)
+        linear = self.columns.linear
+        self.count = len(linear)
+        """Number of those in which efforts are linear; tilt and gain follow them."""
         # Known beside the platform: its ten parameters, zero without one.
         self._payload = inertial_parameters(p.payload.body)
         self.tilt = Tilt(p.gravity)
-        names = names_of(p)
-        self.names = (*_PLATFORM, *(names[n] for n in _LINEAR[PLATFORM:]), *self.tilt.names,
+        names, units = names_of(p), units_of(p)
+        self.names = (*_PLATFORM, *(names[n] for n in linear[PLATFORM:]), *self.tilt.names,
                       'effort_gain')
-        self.units = (*BODY_UNITS, *(UNITS[n] for n in _LINEAR[PLATFORM:]), 'rad', 'rad', '')
+        self.units = (*BODY_UNITS, *(units[n] for n in linear[PLATFORM:]), 'rad', 'rad', '')
         self.start: Array = np.concatenate([
             [p.platform.mass], p.platform.center_of_mass, p.platform.inertia,
-            self._theta[_LINEAR[PLATFORM:]], np.zeros(3)])
-        asked = np.zeros(LINEAR, dtype=bool)
-        for kind in kinds:
-            for part in (*_OF_PLATFORM.get(kind, ()), *_OF_LEGS.get(kind, ())):
+            self._theta[linear[PLATFORM:]], np.zeros(3)])
+        asked = np.zeros(places.whole, dtype=bool)
+        for name in kinds:
+            for part in (*_OF_PLATFORM.get(name, ()), *leg_values(kind).get(name, ())):
                 asked[part] = True
         self.asked: Integers = np.flatnonzero(np.concatenate([
-            asked[_LINEAR], [TILT in kinds] * 2, [False]]))
+            asked[linear], [TILT in kinds] * 2, [False]]))
         scales = _leg_scales(p)
-        of_friction = np.isin(np.arange(LINEAR), np.r_[VISCOUS_FRICTION, COULOMB_FRICTION])
+        of_friction = np.isin(
+            np.arange(places.whole), np.r_[places.viscous_friction, places.coulomb_friction])
         # Numbers that the file does not know at all count if they are asked for.
         level = root_of_covariance(
             p, p.platform.body, np.where(asked | of_friction, scales, 0.0))
         more = [p.uncertainty.tilt, p.uncertainty.tilt, p.uncertainty.effort_gain]
-        self.root: Array = np.diag(np.concatenate([np.zeros(LINEAR_UNKNOWNS), more]))
-        self.root[:LINEAR_UNKNOWNS, :LINEAR_UNKNOWNS] = level[np.ix_(_LINEAR, _LINEAR)]
+        self.root: Array = np.diag(np.concatenate([np.zeros(self.count), more]))
+        self.root[:self.count, :self.count] = level[np.ix_(linear, linear)]
         if known is not None:
             self.root[known] = self.root[:, known] = 0.0
-        self.origins: Integers = np.concatenate([_ORIGIN_OF[_LINEAR], [7, 7, 8]])
+        self.origins: Integers = np.concatenate([self.columns.origins, [7, 7, 8]])
+
+    def _check(self, kinds: Sequence[str]) -> None:
+        """Raise ParameterError for a value of --identify that is one of other legs."""
+        known = leg_values(self._kind)
+        for name in kinds:
+            if name not in (*_OF_PLATFORM, *known, TILT):
+                raise ParameterError(
+                    f'{self._parameters.source}: --identify {name}: not a part of '
+                    f'{self._kind.name} legs: known are {", ".join(known)}')
 
     @property
     def inertial_units(self) -> Array:
@@ -178,9 +227,9 @@ class Unknowns:
         return float((math.log(max(1.0 + part * z, _LEAST_MASS)) / part) ** 2 - z ** 2)
 
     def linear(self, values: Array) -> Array:
-        """Return the parameters (LINEAR,) of the regressor, under level gravity."""
+        """Return the parameters of the regressor, under level gravity."""
         theta = self._theta.copy()
-        theta[_LINEAR] = self._level(values)
+        theta[self.columns.linear] = self._level(values)
         return theta
 
     def theta(self, values: Array) -> Array:
@@ -191,23 +240,24 @@ class Unknowns:
         """
         level = self._level(values)
         change = self.tilt.change(values[-3:-1])
-        return np.concatenate([level, np.outer(change, level[_WEIGHING]).ravel()])
+        return np.concatenate([level, np.outer(change, level[self.columns.weighing]).ravel()])
 
     def derivative(self, values: Array) -> Array:
         """Return the derivative of ``theta`` with respect to the values, (n, k)."""
-        d: Array = np.zeros((LINEAR_UNKNOWNS, len(values)))
+        d: Array = np.zeros((self.count, len(values)))
+        weighing = self.columns.weighing
         d[:PLATFORM, :PLATFORM] = inertial_derivative(values[0], values[CENTER])
-        d[PLATFORM:, PLATFORM:LINEAR_UNKNOWNS] = np.eye(LINEAR_UNKNOWNS - PLATFORM)
+        d[PLATFORM:, PLATFORM:self.count] = np.eye(self.count - PLATFORM)
         angles = values[-3:-1]
-        products = self.tilt.change(angles)[:, None, None] * d[_WEIGHING]
-        products[..., -3:-1] += (self._level(values)[_WEIGHING, None]
+        products = self.tilt.change(angles)[:, None, None] * d[weighing]
+        products[..., -3:-1] += (self._level(values)[weighing, None]
                                  * self.tilt.derivative(angles)[:, None])
         return np.concatenate([d, products.reshape(-1, len(values))])
 
     def _level(self, values: Array) -> Array:
         """Return the linear parameters without those of the tilt."""
         level: Array = np.concatenate([
-            self.inertial(values) + self._payload, values[PLATFORM:LINEAR_UNKNOWNS]])
+            self.inertial(values) + self._payload, values[PLATFORM:self.count]])
         return level
 
     def with_inertial(self, values: Array, ten: Array) -> Array:
@@ -223,17 +273,20 @@ class Unknowns:
 
     def not_negative(self) -> Integers:
         """Return the indices of leg parameters that cannot be negative."""
-        ends = ('.mass.', '.second_moment.', 'reflected_mass.', '_friction.')
-        return np.array([n for n, name in enumerate(self.names) if n >= PLATFORM
-                         and any(end in f'{name}.' for end in ends)], dtype=np.int64)
+        of_legs = (self._kind.fields['reflected_mass'], 'actuator.viscous_friction',
+                   'actuator.coulomb_friction',
+                   *(each.name for each in self._kind.masses if each.positive))
+        return np.array([n for n, name in enumerate(self.names)
+                         if name.rpartition('.')[0] in of_legs], dtype=np.int64)
 
     def parameters(self, values: Array) -> Parameters:
         """Return the parameters with the asked ones of values (k,); ParameterError if invalid."""
         written = self.start.copy()
         written[self.asked] = values[self.asked]
-        theta = self._theta.copy()
-        theta[_LINEAR] = self._level(written)
-        theta[CYLINDER_MASS] = self._masses_of_cylinders(theta)
+        theta, of_masses = self._theta.copy(), Places.of(self._kind).masses
+        theta[self.columns.linear] = self._level(written)
+        theta[of_masses] = self._kind.with_hidden(
+            self._parameters, theta[of_masses].reshape(-1, 6)).ravel()
         try:
             found = parameter_values(theta, self._parameters)
         except ParameterError as exc:
@@ -241,29 +294,24 @@ class Unknowns:
         found |= {'platform.mass': written[0], 'platform.center_of_mass': written[CENTER],
                   'platform.inertia': written[INERTIA],
                   'gravity': self.tilt.gravity(written[-3:-1])}
-        changed: dict[str, Any] = {name: value for name, value in found.items()
-                                   if not _alike(value, self._parameters[name])}
-        if 'actuator.reflected_mass' in changed:
+        changed: dict[str, Any] = {
+            name: value for name, value in found.items()
+            if not _alike(value, self._kind.expanded(self._parameters, name))}
+        if self._kind.fields['reflected_mass'] in changed:
             changed |= dict.fromkeys(DRIVE_INERTIAS)  # from which it would follow
         return self._parameters.replaced(changed, 'identified')
-
-    def _masses_of_cylinders(self, theta: Array) -> Array:
-        """Return cylinder masses (6,) consistent with the moments; they do not affect forces."""
-        first, second = theta[CYLINDER_FIRST], theta[CYLINDER_SECOND]
-        least = np.divide(first ** 2, second, out=np.zeros(6), where=second > 0.0)
-        return np.where(theta[CYLINDER_MASS] * second < first ** 2, 1.0001 * least,
-                        theta[CYLINDER_MASS])
 
 
 def regressor_of(platform: StewartPlatform, rows: Array, tilt: bool = True) -> Array:
     """
     Return the regressor (N, 6, n) of ``Unknowns.theta`` in motions (N, MOTION).
 
-    Without the tilt it is that of the first LINEAR_UNKNOWNS of them.
+    Without the tilt it is that of the first ``Unknowns.count`` of them.
     """
-    regressor: Array = platform.regressors(rows)[..., _LINEAR]
+    linear, weighing, *_ = Columns.of(platform.parameters.leg_kind)
+    regressor: Array = platform.regressors(rows)[..., linear]
     return regressor if not tilt else np.concatenate([regressor, *(
-        platform.regressors_at_rest(rows, axis[None])[..., _LINEAR[_WEIGHING]]
+        platform.regressors_at_rest(rows, axis[None])[..., linear[weighing]]
         for axis in np.eye(3))], axis=-1)
 
 
@@ -284,11 +332,14 @@ def _leg_scales(p: Parameters) -> Array:
     """Return sizes of the linear parameters at which they matter; only those of legs are set."""
     mass, size = p.carried.mass / 6.0, p.singularity.characteristic_length
     weight, rate = _ACCELERATION * mass, _RATE * math.sqrt(_ACCELERATION * size)
-    length = 2.0 * size
-    scales: Array = np.zeros(LINEAR)
-    scales[PISTON_MASS] = scales[REFLECTED_MASS] = mass
-    scales[CYLINDER_FIRST] = scales[PISTON_FIRST] = mass * length
-    scales[CYLINDER_SECOND] = scales[PISTON_SECOND] = mass * length ** 2
-    scales[VISCOUS_FRICTION] = weight / rate
-    scales[COULOMB_FRICTION] = scales[OFFSET] = weight
+    kind, places = p.leg_kind, Places.of(p.leg_kind)
+    reach, distance = kind.reach(p), kind.mass_distances(p)
+    powers = {'kg': 0, 'kg m': 1, 'kg m^2': 2}
+    scales: Array = np.zeros(places.whole)
+    for each in kind.masses:
+        if each.acts:
+            scales[mass_places(kind, each.name)] = mass * distance ** powers[each.unit]
+    scales[places.reflected_mass] = mass * reach ** 2
+    scales[places.viscous_friction] = weight / rate * reach ** 2
+    scales[places.coulomb_friction] = scales[places.offset] = weight * reach
     return scales

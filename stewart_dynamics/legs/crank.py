@@ -11,13 +11,14 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.arrays import Array, Flags, Records
 from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
 from stewart_dynamics.legs.crank_calibration import CrankCalibration
 from stewart_dynamics.legs.kind import (
-    AtHome, IntervalBounds, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
+    AtHome, BaseParameter, IntervalBounds, LegKind, LegMass, Named, Placed, Solid, STANDARD_G,
+    StopLoads, ZeroCause)
 from stewart_dynamics.legs.lines import (
     AnchorCircles, AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
@@ -39,6 +40,14 @@ _POSITION, _ROTATION = (places('stewart_motion')[each] for each in ('position', 
 # A stop near a dead centre is expected to end motions before half of its lever, or before this.
 _DEEPEST = 0.5
 _LEAST_LEVER = 0.01
+# Noise of usual measured torques, by the share of a crank in the weight of the platform.
+_NOISE = 0.01
+# An inertia that rounding made negative is taken as zero, by that about the joint.
+_ROUNDING = 1e-9
+# Sums of masses that the torques show, as names of linear parameters.
+_MOMENT, _INERTIA, _END, _COUPLING = (
+    'legs.crank.first_moment', 'legs.crank.inertia_about_axis.uu', 'legs.rod.crank_end_mass',
+    'legs.rod.coupling_mass')
 
 
 class Crank(LegKind):
@@ -79,11 +88,18 @@ class Crank(LegKind):
         **{f'servo_{name}': f'servo.{name}' for name in (
             'pulse_min', 'pulse_max', 'angle_at_min', 'angle_at_max')}}
     masses = (
-        *(LegMass(f'legs.crank.first_moment.{axis}', 'kg m') for axis in 'enu'),
-        *(LegMass(f'legs.crank.inertia_about_axis.{axes}', 'kg m^2')
+        *(LegMass(f'legs.crank.first_moment.{axis}', 'kg m', 'crank', 'legs.crank.center_of_mass',
+                  acts=axis != 'u', weighs=axis != 'u') for axis in 'enu'),
+        *(LegMass(f'legs.crank.inertia_about_axis.{axes}', 'kg m^2', 'crank',
+                  'legs.crank.inertia', acts=axes == 'uu', positive=axes == 'uu')
           for axes in ('ee', 'en', 'eu', 'nn', 'nu', 'uu')),
-        *(LegMass(f'legs.rod.{name}', 'kg')
-          for name in ('crank_end_mass', 'coupling_mass', 'platform_end_mass')))
+        *(LegMass(f'legs.rod.{name}_mass', 'kg', 'rod', 'legs.rod.mass', weighs=True,
+                  positive=name != 'coupling')
+          for name in ('crank_end', 'coupling', 'platform_end')))
+    weights = 'legs.crank.first_moment.e', 'legs.rod.coupling_mass'
+    zero_cause = ZeroCause(
+        'angle_zero', 'zero of the angles', 'deg', math.degrees(1.0),
+        'the zero or the sign of an angle or the geometry is wrong, or legs are swapped')
     massless = {
         'legs.crank.mass': 0.0, 'legs.crank.inertia': 0.0, 'legs.rod.mass': 0.0,
         'legs.rod.inertia': 0.0, 'actuator.reflected_inertia': 0.0, 'drive.motor_inertia': None}
@@ -151,6 +167,67 @@ class Crank(LegKind):
         return [np.concatenate([moments, inertia, of_rod])
                 for moments, inertia, of_rod in changes]
 
+    def with_hidden(self, parameters: Parameters, values: Array) -> Array:
+        """Return the moments of cranks about other axes than that of the motor for the others."""
+        complete = values.copy()
+        centers, inertias = crank_bodies(parameters)
+        mass = _masses_of_cranks(parameters, values)
+        centers[:, :2] = np.divide(values[:2], mass, out=np.zeros((2, 6)), where=mass > 0.0).T
+        complete[2] = mass * centers[:, 2]
+        complete[3:8] = (inertias.T + mass * _about(centers))[:5]
+        return complete
+
+    def mass_parameters(self, parameters: Parameters, values: Array) -> dict[str, Any]:
+        """
+        Return masses, centers of mass and inertias of cranks and rods.
+
+        The torques do not show the mass of a crank, which is the file's, or the least that a body
+        with these moments can have.
+        """
+        mass = _masses_of_cranks(parameters, values)
+        centers = np.divide(
+            values[:3], mass, out=crank_bodies(parameters)[0].T.copy(), where=mass > 0.0).T
+        about_axes = values[3:9]
+        inertias = (about_axes - mass * _about(centers)).T
+        inertias[np.abs(inertias) < _ROUNDING * np.abs(about_axes.T)] = 0.0
+        _check_bodies(parameters, 'legs.crank', inertias[:, 5] < 0.0, {
+            'first moment {:g} kg m': np.hypot(*values[:2]),
+            'inertia about the axis {:g} kg m^2': about_axes[5]})
+        end, coupling, carried = values[9:]
+        size = parameters['legs.rod.length']
+        rods = end + 2.0 * coupling + carried
+        rods[np.abs(rods) < _ROUNDING * (np.abs(end) + np.abs(carried))] = 0.0
+        part = np.divide(coupling + carried, rods, where=rods != 0.0, out=(
+            tree.rod_value(parameters, 'center_of_mass') / size))
+        turning = end - rods * (1.0 - part) ** 2
+        turning[np.abs(turning) < _ROUNDING * np.abs(end)] = 0.0
+        _check_bodies(parameters, 'legs.rod', (rods < 0.0) | (turning < 0.0), {
+            'mass {:g} kg': rods, 'center of mass {:g} m': part * size,
+            'inertia {:g} kg m^2': turning * size ** 2})
+        return {'legs.crank.mass': mass, 'legs.crank.center_of_mass': centers,
+                'legs.crank.inertia': inertias, 'legs.rod.mass': rods,
+                'legs.rod.center_of_mass': part * size, 'legs.rod.inertia': turning * size ** 2}
+
+    def mass_distances(self, parameters: Parameters) -> Array:
+        """Return the lengths of the cranks."""
+        return self.reach(parameters)
+
+    def effort_noise(self, parameters: Parameters) -> float:
+        """Return a part of the torque by which a crank holds its share of the platform."""
+        weight = parameters.carried.mass * STANDARD_G / 6.0
+        return float(_NOISE * weight * np.mean(self.reach(parameters)))
+
+    def base_parameters(self, parameters: Parameters) -> tuple[BaseParameter, ...]:
+        """Return inertia about the axis with rotor and rod, first moments, and coupling mass."""
+        size, ones = parameters['legs.crank.length'], np.ones(6)
+        return (
+            BaseParameter('legs.crank.shaft_inertia', 'kg m^2', {
+                _INERTIA: ones, self.fields['reflected_mass']: ones, _END: size ** 2}),
+            BaseParameter('legs.crank.shaft_moment.e', 'kg m', {
+                f'{_MOMENT}.e': ones, _END: size}),
+            BaseParameter('legs.crank.shaft_moment.n', 'kg m', {f'{_MOMENT}.n': ones}),
+            BaseParameter(_COUPLING, 'kg', {_COUPLING: ones}))
+
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the rods, whose anchors are the ends of the cranks: A(q) = c + L1 e(q)."""
         at = _angle_of(parameters, position, rotation)
@@ -163,6 +240,10 @@ class Crank(LegKind):
     def anchors(self, parameters: Parameters, positions: Array) -> Array:
         """Return the ends of the cranks."""
         return crank_ends(parameters, positions)
+
+    def line_lengths(self, parameters: Parameters, positions: Array) -> Array:
+        """Return the lengths of the rods."""
+        return np.broadcast_to(parameters['legs.rod.length'], positions.shape)
 
     def place_solids(self, parameters: Parameters, joints: Array, positions: Array,
                      ) -> tuple[Placed, ...]:
@@ -439,6 +520,25 @@ def _about(centers: Array) -> Array:
     """Return the inertia (6, 6) of a mass of 1 at each center (6, 3), about the origin."""
     x, y, z = centers.T
     return np.stack([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y])
+
+
+def _masses_of_cranks(parameters: Parameters, values: Array) -> Array:
+    """Return masses (6,) of the file, or the least of bodies with these ``mass_values``."""
+    mass: Array = parameters['legs.crank.mass']
+    squares, inertia = np.sum(values[:2] ** 2, axis=0), values[8]
+    least = np.divide(squares, inertia, out=np.zeros(6), where=inertia > 0.0)
+    found: Array = np.where(mass < (1.0 - _ROUNDING) * least, 1.0001 * least, mass)
+    return found
+
+
+def _check_bodies(parameters: Parameters, name: str, wrong: Flags, numbers: dict[str, Array],
+                  ) -> None:
+    """Raise ParameterError for the first leg of which no body has these numbers (6,)."""
+    if wrong.any():
+        leg = int(np.argmax(wrong))
+        words = ', '.join(text.format(values[leg]) for text, values in numbers.items())
+        raise ParameterError(
+            f'{name} of {parameters.joints[leg]}: {words}: no body has these')
 
 
 class _Angle(NamedTuple):

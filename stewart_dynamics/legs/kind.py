@@ -55,6 +55,35 @@ class LegMass(NamedTuple):
 
     name: str  # as in the names of linear parameters
     unit: str
+    part: str  # of ``LegKind.bodies``
+    parameter: str  # that is written where it is identified
+    acts: bool = True  # efforts on a base at rest depend on it
+    weighs: bool = False  # those under gravity do
+    positive: bool = False  # it cannot be negative
+
+
+class BaseParameter(NamedTuple):
+    """A sum of masses and moments of each leg that efforts on a base at rest show alone."""
+
+    name: str
+    unit: str
+    terms: Mapping[str, Array]  # coefficients (6,) by the names of linear parameters
+
+
+class ZeroCause(NamedTuple):
+    """A wrong zero of the measured positions, as a cause of a lack of fit."""
+
+    what: str  # keyword for programs
+    name: str
+    unit: str
+    factor: float  # from the unit of positions
+    no_pose: str  # likely mistakes where no pose has the positions
+    same_as: str = ''  # cause with the same forces
+
+    @property
+    def subject(self) -> str:
+        """Return its name at the begin of a sentence."""
+        return f'the {self.name}' if ' ' in self.name else self.name
 
 
 class StopLoads(NamedTuple):
@@ -181,6 +210,10 @@ class LegKind(ABC):
         Fields of ``stewart_leg`` that hold parameters of this kind.
     masses : tuple of LegMass
         Masses and moments in the regressor, in the order of the columns in C.
+    weights : tuple of str
+        Names of masses that show by how much the masses of the legs differ from a file.
+    zero_cause : ZeroCause
+        The cause of a lack of fit that a wrong zero of the measured positions is.
     massless : mapping
         Values of parameters with which the legs and the drives have no mass.
     solids : tuple of Solid
@@ -241,6 +274,8 @@ class LegKind(ABC):
     foreign: tuple[str, ...]  # the ``own`` of other kinds, without those of this one
     fields: Mapping[str, str]
     masses: tuple[LegMass, ...]
+    weights: tuple[str, ...]
+    zero_cause: ZeroCause
     massless: Mapping[str, Any]
     solids: tuple[Solid, ...]
     alternatives: tuple[tuple[str, ...], ...] = ()  # parameters, or others in their place
@@ -312,6 +347,35 @@ class LegKind(ABC):
         """
 
     @abstractmethod
+    def with_hidden(self, parameters: Parameters, values: Array) -> Array:
+        """
+        Return ``mass_values`` (n, 6) with those that do not act completed by the others.
+
+        Efforts on a base at rest determine the others alone; bodies have all of them.
+        """
+
+    @abstractmethod
+    def mass_parameters(self, parameters: Parameters, values: Array) -> dict[str, Any]:
+        """
+        Return the parameters of bodies with ``mass_values`` (n, 6), in full.
+
+        Raises ParameterError: no body has these.
+        """
+
+    @abstractmethod
+    def mass_distances(self, parameters: Parameters) -> Array:
+        """Return distances from the joints at which masses of the legs act (6,) [m]."""
+
+    @abstractmethod
+    def effort_noise(self, parameters: Parameters) -> float:
+        """Return the deviation of the noise of usual measured efforts."""
+
+    def base_parameters(self, parameters: Parameters) -> tuple[BaseParameter, ...]:
+        """Return the sums that efforts on a base at rest show; empty: they are not listed."""
+        del parameters
+        return ()
+
+    @abstractmethod
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the lines of force in poses (...); not finite where a leg does not reach."""
 
@@ -323,6 +387,11 @@ class LegKind(ABC):
         """
         del parameters, positions
         return None
+
+    def line_lengths(self, parameters: Parameters, positions: Array) -> Array:
+        """Return the lengths of the lines of force (..., 6) [m] at positions of the drives."""
+        del parameters
+        return positions
 
     @abstractmethod
     def place_solids(self, parameters: Parameters, joints: Array, positions: Array,

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Records
+from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.legs import telescopic_tree as tree
 from stewart_dynamics.legs.kind import (
-    IntervalBounds, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads)
+    IntervalBounds, LegKind, LegMass, Named, Placed, Solid, STANDARD_G, StopLoads, ZeroCause)
 from stewart_dynamics.legs.lines import Lines, lines_from, per_leg, skew, transposed
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, SLIDE, UNIVERSAL
 from stewart_dynamics.legs.telescopic_calibration import TelescopicCalibration
@@ -23,6 +24,19 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
 _OF_LENGTH = 0.5  # length of a cylinder in pictures by its leg, where that has no limit
+_NOISE = 5.0  # of usual measured forces [N]
+# A moment of inertia that rounding made negative is taken as zero, by the second moment.
+_ROUNDING = 1e-9
+
+
+def _masses_of(part: str) -> tuple[LegMass, ...]:
+    """Return mass, first and second moment; the mass of a cylinder alone has no effect."""
+    acts = part == 'piston'
+    return (LegMass(f'legs.{part}.mass', 'kg', part, f'legs.{part}.mass', acts, acts, acts),
+            LegMass(f'legs.{part}.first_moment', 'kg m', part, f'legs.{part}.center_of_mass',
+                    weighs=True),
+            LegMass(f'legs.{part}.second_moment', 'kg m^2', part, f'legs.{part}.inertia',
+                    positive=True))
 
 
 class Telescopic(LegKind):
@@ -58,9 +72,11 @@ class Telescopic(LegKind):
         'piston_inertia': 'legs.piston.inertia', 'reflected_mass': 'actuator.reflected_mass',
         'cylinder_radius': 'legs.cylinder.radius', 'cylinder_length': 'legs.cylinder.length',
         'piston_radius': 'legs.piston.radius'}
-    masses = tuple(LegMass(f'legs.{part}.{name}', unit) for part in ('cylinder', 'piston')
-                   for name, unit in (('mass', 'kg'), ('first_moment', 'kg m'),
-                                      ('second_moment', 'kg m^2')))
+    masses = (*_masses_of('cylinder'), *_masses_of('piston'))
+    weights = 'legs.cylinder.second_moment', 'legs.piston.second_moment'
+    zero_cause = ZeroCause(
+        'zero_length', 'geometry.zero_length', 'mm', 1e3,
+        'geometry.zero_length or the geometry is wrong, or legs are swapped', same_as='joint')
     massless = {
         'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.piston.mass': 0.0,
         'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0, 'drive.motor_inertia': None,
@@ -101,6 +117,46 @@ class Telescopic(LegKind):
                 rows[3 * n:3 * n + 3] = change
                 found.append(rows)
         return found
+
+    def with_hidden(self, parameters: Parameters, values: Array) -> Array:
+        """Return masses of cylinders that bodies with their moments can have."""
+        complete = values.copy()
+        mass, first, second = values[:3]
+        least = np.divide(first ** 2, second, out=np.zeros(6), where=second > 0.0)
+        complete[0] = np.where(mass * second < first ** 2, 1.0001 * least, mass)
+        return complete
+
+    def mass_parameters(self, parameters: Parameters, values: Array) -> dict[str, Any]:
+        """Return masses, centers of mass and inertias of cylinders and pistons."""
+        found: dict[str, Any] = {}
+        for n, part in enumerate(parameters.legs.parts):
+            masses, firsts, seconds = values[3 * n:3 * n + 3]
+            massless = masses == 0.0
+            wrong = (masses < 0.0) | (massless & (firsts != 0.0))
+            distances = np.divide(
+                firsts, masses, out=parameters.legs.parts[part].center_of_mass.copy(),
+                where=~massless)
+            inertias = seconds - firsts * distances * ~massless
+            inertias[np.abs(inertias) < _ROUNDING * np.abs(seconds)] = 0.0
+            wrong |= inertias < 0.0
+            if wrong.any():
+                leg = int(np.argmax(wrong))
+                raise ParameterError(
+                    f'legs.{part} of {parameters.joints[leg]}: mass {masses[leg]:g} kg, first '
+                    f'moment {firsts[leg]:g} kg m, second moment {seconds[leg]:g} kg m^2: no body '
+                    'has these')
+            found |= {f'legs.{part}.mass': masses.copy(),
+                      f'legs.{part}.center_of_mass': distances, f'legs.{part}.inertia': inertias}
+        return found
+
+    def mass_distances(self, parameters: Parameters) -> Array:
+        """Return the size of the platform, twice."""
+        return np.full(6, 2.0 * parameters.singularity.characteristic_length)
+
+    def effort_noise(self, parameters: Parameters) -> float:
+        """Return the noise of load cells."""
+        del parameters
+        return _NOISE
 
     def lines(self, parameters: Parameters, position: Array, rotation: Array) -> Lines:
         """Return the legs: (1), (2)."""

@@ -486,6 +486,23 @@ class StewartPlatform:
                 self._legs(motion), motion.linear_velocity, motion.angular_velocity),
                 len(motion.shape))
 
+    def position_jacobian(self, pose: Pose | Motion) -> Array:
+        """
+        Return J (..., 6, 6): rates of the measured positions = J [v; w].
+
+        Positions are those of ``inverse_kinematics``. It is J_q but for screws that turn with
+        their legs: lengths are measured there, so that it is J_inv.
+        """
+        return lagrange.drive_jacobian(self._legs(pose), pose.rotation)
+
+    def position_jacobian_rate(self, motion: Motion) -> Array:
+        """Return the derivative of ``position_jacobian`` by time (..., 6, 6) in a motion."""
+        check_kind(motion, Motion)
+        with np.errstate(all='ignore'):
+            return check_finite('motion', lagrange.drive_jacobian_rate(
+                self._legs(motion), motion.rotation, motion.linear_velocity,
+                motion.angular_velocity), len(motion.shape))
+
     def mass_matrix(self, pose: Pose | Motion) -> Array:
         """
         Return M (..., 6, 6) of M X'' + C X' + G = J_q^T f + wrench, with X' = [v; w].

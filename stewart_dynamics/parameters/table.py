@@ -628,10 +628,10 @@ class UncertaintyGroup(ParameterGroup):
     inertia: float = _deviation(
         'platform.inertia, relative to its mean principal moment', '', 1.0)
     leg_mass: float = _deviation(
-        'masses, centers of mass and inertias of cylinders and pistons, relative to them: once of '
+        'masses, centers of mass and inertias of the parts of the legs, relative to them: once of '
         'all legs together, and again of each leg', '', 0.05)
     reflected_mass: float = _deviation(
-        'actuator.reflected_mass of each leg, relative to it', '', 0.1)
+        'actuator.reflected_mass or reflected_inertia of each leg, relative to it', '', 0.1)
     effort_gain: float = _deviation(
         'the gain of measured efforts, of all legs together', '', 0.01)
     tilt: float = _deviation(

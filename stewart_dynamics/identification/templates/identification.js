@@ -31,15 +31,15 @@ function show(leg) {
   const [effort, before, after, rate] = [1, 7, 13, 19].map((first) => columns[first + leg]);
   Plotly.react('forces', [
     line('measured', effort, color('black'), 2.2), line('by the file', before, color('leg4'), 1.4),
-    line('by the identified parameters', after, color('leg0'), 1.4, 'dot')], layout('force [N]'), CONFIG);
+    line('by the identified parameters', after, color('leg0'), 1.4, 'dot')], layout(`${data.effort} [${data.unit}]`), CONFIG);
   Plotly.react('residuals', [
     line('residual by the file', less(effort, before), color('leg4'), 1.2),
-    line('by the identified parameters', less(effort, after), color('leg0'), 1.2)], layout('residual [N]'), CONFIG);
+    line('by the identified parameters', less(effort, after), color('leg0'), 1.2)], layout(`residual [${data.unit}]`), CONFIG);
   const some = (each) => each.filter((_, n) => n % drawn === 0);
   Plotly.react('rates', [[before, 'by the file', 'leg4'], [after, 'by the identified parameters', 'leg0']].map(([force, name, of]) => ({
     x: some(rate), y: some(less(effort, force)), name, type: 'scatter', mode: 'markers', marker: {size: 3, color: color(of), opacity: 0.5},
-  })), layout('residual [N]', {
-    xaxis: {title: {text: 'rate of the leg [m/s]'}, gridcolor: color('grid'), zerolinecolor: color('zero')}, hovermode: 'closest',
+  })), layout(`residual [${data.unit}]`, {
+    xaxis: {title: {text: `${data.rate} of the leg [${data.rate_unit}]`}, gridcolor: color('grid'), zerolinecolor: color('zero')}, hovermode: 'closest',
   }), CONFIG);
   document.querySelectorAll('#legs button').forEach((button, n) => button.setAttribute('aria-pressed', n === leg));
 }
@@ -68,8 +68,8 @@ if (spectra.length) {
     showlegend: n === 0 || n > 5, line: {color: color(n < 6 ? 'faint' : `leg${n - 6}`), width: n < 6 ? 1 : 1.5},
     opacity: n < 6 ? 0.6 : 1,
   }));
-  Plotly.newPlot('spectrum', traces, layout('residual [N/√Hz]', {
+  Plotly.newPlot('spectrum', traces, layout(`residual [${data.unit}/√Hz]`, {
     xaxis: {title: {text: 'frequency [Hz]'}, type: 'log', gridcolor: color('grid')},
-    yaxis: {title: {text: 'residual [N/√Hz]'}, type: 'log', gridcolor: color('grid')}, hovermode: 'closest',
+    yaxis: {title: {text: `residual [${data.unit}/√Hz]`}, type: 'log', gridcolor: color('grid')}, hovermode: 'closest',
   }), CONFIG);
 } else document.getElementById('spectrum').textContent = 'Too few samples for a spectrum.';

@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The parameters in which leg forces are linear, theta (70,): their order, their names, both ways.
+The parameters in which efforts are linear, theta (n,): their order, their names, both ways.
 
 Platform and payload have ten: mass, first moment m c, inertia about the platform's origin (not
-about the center of mass). Each part of a leg has three: mass m, first moment m S, second moment
-I + m S^2 about its joint (cylinder: base joint, piston: platform joint). Each actuator has
-reflected mass, viscous and Coulomb friction; each measured effort has a constant offset, which is
-zero in every parameter file.
+about the center of mass). Those of the legs are ``LegKind.masses``; telescopic ones have three for
+each part: mass m, first moment m S, second moment I + m S^2 about its joint (cylinder: base joint,
+piston: platform joint). Each actuator has reflected mass, viscous and Coulomb friction; each
+measured effort has a constant offset, which is zero in every parameter file.
 
-Each kind has one number per leg: ``theta[VISCOUS_FRICTION]`` are six numbers. The mass of a
-cylinder alone does not affect the leg forces, and the second moments of both parts of a leg have
-the same effect.
+Each of them is one number per leg: ``theta[places.viscous_friction]`` are six numbers. Not all act
+on efforts, and some have the same effect: the mass of a cylinder, the second moments of both parts
+of a telescopic leg.
 """
 
 from __future__ import annotations
@@ -29,11 +29,7 @@ from stewart_dynamics.mechanics.rows import consecutive
 from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.table import Parameters
 
-(PLATFORM, CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND, PISTON_MASS, PISTON_FIRST,
- PISTON_SECOND, REFLECTED_MASS, VISCOUS_FRICTION, COULOMB_FRICTION, OFFSET) = consecutive(
-     10, *10 * [6])
-LINEAR = OFFSET.stop  # the number of parameters
-
+PLATFORM = slice(0, 10)
 # Indices of the ten parameters of the platform.
 MASS, FIRST_MOMENT, INERTIA = 0, slice(1, 4), slice(4, 10)
 
@@ -41,30 +37,21 @@ _OF_PLATFORM = {  # names and units
     'platform.mass': 'kg', **{f'platform.first_moment.{axis}': 'kg m' for axis in 'xyz'},
     **{f'platform.inertia_about_origin.{axes}': 'kg m^2'
        for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')}}
-_OF_LEGS = {
-    **{f'legs.{part}.{name}': unit for part in ('cylinder', 'piston') for name, unit in (
-        ('mass', 'kg'), ('first_moment', 'kg m'), ('second_moment', 'kg m^2'))},
-    'actuator.reflected_mass': 'kg', 'actuator.viscous_friction': 'N s/m',
-    'actuator.coulomb_friction': 'N', 'effort_offset': 'N'}
-_PARTS = (('cylinder', CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND),
-          ('piston', PISTON_MASS, PISTON_FIRST, PISTON_SECOND))
-_OF_ACTUATORS = {'actuator.reflected_mass': REFLECTED_MASS,
-                 'actuator.viscous_friction': VISCOUS_FRICTION,
-                 'actuator.coulomb_friction': COULOMB_FRICTION}
 
 # Units of a body as a parameter file has it: mass, center of mass, inertia about it.
 BODY_UNITS = ('kg', *3 * ['m'], *6 * ['kg m^2'])
-# The unit of each parameter.
-UNITS = (*_OF_PLATFORM.values(), *(unit for unit in _OF_LEGS.values() for _ in range(6)))
-
-# A moment of inertia that rounding made negative is taken as zero, by the second moment.
-_ROUNDING = 1e-9
 
 
 def names_of(p: Parameters) -> tuple[str, ...]:
     """Return the names of the parameters; names of leg parameters end with the leg's name."""
     of_legs = [*(each.name for each in p.leg_kind.masses), *_of_drives(p)]
     return (*_OF_PLATFORM, *(f'{name}.{leg}' for name in of_legs for leg in p.joints))
+
+
+def units_of(p: Parameters) -> tuple[str, ...]:
+    """Return the unit of each parameter."""
+    of_legs = [*(each.unit for each in p.leg_kind.masses), *_of_drives(p).values()]
+    return (*_OF_PLATFORM.values(), *(unit for unit in of_legs for _ in range(6)))
 
 
 def _of_drives(p: Parameters) -> dict[str, str]:
@@ -93,11 +80,17 @@ class Places(NamedTuple):
     @classmethod
     def of(cls, kind: LegKind) -> Places:
         """Return the places of a kind."""
-        return cls(*consecutive(10, 6 * len(kind.masses), *4 * [6])[1:])
+        return cls(*consecutive(PLATFORM.stop, 6 * len(kind.masses), *4 * [6])[1:])
+
+
+def mass_places(kind: LegKind, name: str) -> slice:
+    """Return where theta has the six numbers of one of ``LegKind.masses``."""
+    first = PLATFORM.stop + 6 * [each.name for each in kind.masses].index(name)
+    return slice(first, first + 6)
 
 
 def linear_parameters(p: Parameters) -> Array:
-    """Return theta (n,) of a hexapod, SI units; n is LINEAR with telescopic legs."""
+    """Return theta (n,) of a hexapod, SI units."""
     of_drives = [p[name] for name in _of_drives(p) if name in p]
     return np.concatenate([inertial_parameters(p.carried), p.leg_kind.mass_values(p).ravel(),
                            *of_drives, np.zeros(6)])
@@ -107,8 +100,9 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
     """
     Return the values of theta under the names of a parameter file, offsets left out.
 
-    theta (LINEAR,): parameters of a hexapod, SI units.
-    p: source of the payload, and of the center of mass of each part of a leg without mass.
+    theta (n,): parameters of a hexapod, SI units.
+    p: source of the payload, and of numbers that theta does not contain, such as the center of
+        mass of each part of a leg without mass.
     Raises ParameterError: no body has these parameters: a mass is not positive, or a part of a leg
         has moments without mass or a negative inertia about its center of mass.
     """
@@ -122,23 +116,11 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
     values: dict[str, Any] = {
         'platform.mass': mass, 'platform.center_of_mass': center,
         'platform.inertia': theta[INERTIA] - about_origin(mass, center, np.zeros(6))}
-    for part, of_mass, first, second in _PARTS:
-        masses, firsts, seconds = theta[of_mass], theta[first], theta[second]
-        massless = masses == 0.0
-        wrong = (masses < 0.0) | (massless & (firsts != 0.0))
-        distances = np.divide(firsts, masses, out=p.legs.parts[part].center_of_mass.copy(),
-                              where=~massless)
-        inertias = seconds - firsts * distances * ~massless
-        inertias[np.abs(inertias) < _ROUNDING * np.abs(seconds)] = 0.0
-        wrong |= inertias < 0.0
-        if wrong.any():
-            leg = int(np.argmax(wrong))
-            raise ParameterError(
-                f'legs.{part} of {p.joints[leg]}: mass {masses[leg]:g} kg, first moment '
-                f'{firsts[leg]:g} kg m, second moment {seconds[leg]:g} kg m^2: no body has these')
-        values |= {f'legs.{part}.mass': masses.copy(),
-                   f'legs.{part}.center_of_mass': distances, f'legs.{part}.inertia': inertias}
-    return values | {name: theta[where].copy() for name, where in _OF_ACTUATORS.items()}
+    kind, places = p.leg_kind, Places.of(p.leg_kind)
+    of_drives = places.reflected_mass, places.viscous_friction, places.coulomb_friction
+    return values | kind.mass_parameters(p, theta[places.masses].reshape(-1, 6)) | {
+        name: theta[where].copy() for name, where in zip(
+            _of_drives(p), of_drives, strict=False)}
 
 
 def inertial_parameters(body: Body) -> Array:
