@@ -5,7 +5,7 @@
 Recordings that judge the estimates of identification and payload.
 
 True hexapods are drawn from ``uncertainty.*`` of the parameter file, their motions and efforts are
-those of ``independent_hexapod`` and ``cranks_by_virtual_power``, and sensors add noise, quantization,
+those of ``independent_hexapod`` and ``cranks_by_power``, and sensors add noise, quantization,
 jitter and delay.
 """
 
@@ -16,7 +16,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import cranks_by_virtual_power
+import cranks_by_power
 from independent_hexapod import Controlled, Legs, moving
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +74,7 @@ class Case(NamedTuple):
 CRANKS = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
 CASES = {
     'telescopic': Case(GIVEN, moving, HOME),
-    'crank': Case(CRANKS, cranks_by_virtual_power.moving, np.array([0.0, 0.0, 0.648, 0.0, 0.0, 0.0]),
+    'crank': Case(CRANKS, cranks_by_power.moving, np.array([0.0, 0.0, 0.648, 0.0, 0.0, 0.0]),
                   1.0, float(CRANKS['legs.crank.length'][0]))}
 
 
@@ -130,7 +130,7 @@ def _of_pistons(p: Parameters) -> dict[str, float]:
 def _of_cranks(p: Parameters) -> dict[str, float]:
     """Return the values of cranks and rods, and the sums of them that torques show."""
     found = {}
-    bodies, rotors = cranks_by_virtual_power.CrankBodies.of(p), p['actuator.reflected_inertia']
+    bodies, rotors = cranks_by_power.CrankBodies.of(p), p['actuator.reflected_inertia']
     for leg, joint in enumerate(p['joints']):
         mass, size = p['legs.crank.mass'][leg], p['legs.crank.length'][leg]
         x, y, _ = bodies.centers[leg]
@@ -189,7 +189,7 @@ def drawn(seed: int, given: Parameters = GIVEN) -> Truth:
         reflected: p[reflected] * relative('reflected_mass', 6),
         **{f'actuator.{kind}_friction': p[f'actuator.{kind}_friction'] * random.uniform(
             0.3, 2.0, 6) for kind in ('viscous', 'coulomb')}}
-    of_rods = cranks_by_virtual_power.CrankBodies.of(p) if kind.name == 'crank' else None
+    of_rods = cranks_by_power.CrankBodies.of(p) if kind.name == 'crank' else None
     for part in kind.bodies:
         for name in ('mass', 'center_of_mass', 'inertia'):
             value = p[f'legs.{part}.{name}']

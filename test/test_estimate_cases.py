@@ -8,8 +8,8 @@ from __future__ import annotations
 from crank_machines import random_machine, random_state
 from crank_newton_euler import inverse_dynamics
 from crank_platforms import motion_of, parameters_of
+import cranks_by_power
 from estimate_cases import AXES, CRANKS, drawn, legs_of, MOTIONS, SLOW, stopping
-import cranks_by_virtual_power
 from independent_hexapod import Controlled, moving
 import numpy as np
 import pytest
@@ -40,12 +40,12 @@ def test_cranks_are_those_of_free_bodies_and_of_this_package(seed: int) -> None:
         at = motion_of(state)
         loaded = StewartPlatform(p).inverse_dynamics(at, state.wrench).torques
         without = StewartPlatform(p).inverse_dynamics(at).torques
-        legs = cranks_by_virtual_power.moving(p, Motion.of_rows(at.rows[None]))
+        legs = cranks_by_power.moving(p, Motion.of_rows(at.rows[None]))
         assert relative(legs.rates[0], truth.rates) < 1e-11
         assert relative(legs.forces[0] + loaded - without, truth.torques) < 1e-11
         motions.append(at.rows)
     rows = Motion.of_rows(np.array(motions))
-    assert relative(cranks_by_virtual_power.moving(p, rows).forces,
+    assert relative(cranks_by_power.moving(p, rows).forces,
                     StewartPlatform(p).inverse_dynamics(rows).torques) < 1e-11
 
 
