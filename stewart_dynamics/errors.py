@@ -47,10 +47,6 @@ class ParameterError(StewartError, ValueError):
     """A parameter, or the file that it comes from, breaks a rule."""
 
 
-class KindError(ParameterError):
-    """A feature is not available for the kind of legs of a hexapod."""
-
-
 class MotionError(StewartError, ValueError):
     """Arrays of a pose or motion whose shapes do not fit, or values that are not valid."""
 

@@ -442,6 +442,11 @@ def test_designed_poses_are_written(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     found = read_poses(tmp_path / 'designed' / 'poses.csv', RIG)
     assert_allclose(StewartPlatform(RIG).inverse_kinematics(found.poses), found.positions,
                     atol=1e-12)
+    rows = np.genfromtxt(tmp_path / 'designed' / 'trajectory.csv', delimiter=',', names=True)
+    columns = np.stack([rows[name] for name in rows.dtype.names], axis=-1)
+    at_rest = columns[(columns[:, 8:] == 0.0).all(axis=1), 1:4]
+    for position in found.poses.position:
+        assert np.abs(at_rest - position).max(axis=1).min() < 1e-12
 
 
 def test_poses_at_rest_of_a_bag(tmp_path: Path) -> None:

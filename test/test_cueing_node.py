@@ -173,6 +173,20 @@ def test_begins_with_the_approach_from_the_measured_legs(cueing: Any) -> None:
     np.testing.assert_allclose(rows[-1, 3:], 0.0, atol=1e-9)
 
 
+def test_cranks_approach_home_from_their_measured_angles(cueing: Any) -> None:
+    file = PLATFORM.with_name('crank_platform.yaml')
+    p = Parameters.from_yaml(file)
+    home, node = home_pose(p), cueing(file=file)
+    pose = home.position - [0.0, 0.0, 0.05]
+    angles = StewartPlatform(p).inverse_kinematics(Pose(pose, home.rotation))
+    legs = JointState(name=list(p.joints), position=angles.tolist())
+    node.until(lambda: node.legs.publish(legs) or node.raw['accel'], 'setpoints come')
+    node.until(lambda: abs(node.last[2] - home.position[2]) < 1e-9, 'it is at home')
+    _, rows = node.rows()
+    np.testing.assert_allclose(rows[0, :3], pose, atol=1e-9)
+    np.testing.assert_allclose(rows[-1, 3:], 0.0, atol=1e-9)
+
+
 def test_it_does_not_start_without_an_approach(cueing: Any) -> None:
     """From a measured pose outside the limits: not from home either, where it is not."""
     node = cueing('start_timeout:=1.0', 'limits.length_min:=[0.95]')

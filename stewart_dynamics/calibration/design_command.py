@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from stewart_dynamics.errors import KindError
 from stewart_dynamics.estimation.confidence_level import INTERVAL
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import between, whole
@@ -47,15 +46,10 @@ def run(given: argparse.Namespace, parameters: Parameters, folder: Path) -> str:
     platform = StewartPlatform(parameters)
     noise = Noise(*given.noise) if given.noise else NOISE
     found = design_poses(platform, given.design, noise, given.seed, given.unknowns)
-    files = {DESIGNED_POSES: poses_csv(parameters.joints, found.positions, found.poses)}
-    try:
-        with tqdm(total=given.design, disable=None, leave=False, unit='pose') as bar:
-            motion = visit(
-                platform, found.poses, given.rest, lambda done: bar.update(done - bar.n))
-        files[WAY_THROUGH_POSES] = trajectory_csv(motion)
-        way = f'{motion.times[-1]:.0f} s through them: {folder / WAY_THROUGH_POSES}'
-    except KindError as exc:
-        way = f'no trajectory through them: {exc}'
+    with tqdm(total=given.design, disable=None, leave=False, unit='pose') as bar:
+        motion = visit(platform, found.poses, given.rest, lambda done: bar.update(done - bar.n))
+    files = {DESIGNED_POSES: poses_csv(parameters.joints, found.positions, found.poses),
+             WAY_THROUGH_POSES: trajectory_csv(motion)}
     with whole_folder(folder, options, DESIGNED_POSES, before) as partial:
         write_files({partial / name: text for name, text in files.items()})
     micro = 'um' if parameters.leg_kind.position.unit == 'm' else 'urad'
@@ -70,4 +64,5 @@ def run(given: argparse.Namespace, parameters: Parameters, folder: Path) -> str:
             name = '.'.join(filter(None, (each.name.removeprefix('geometry.'), axis)))
             if own > 0.0:
                 lines.append(f'  {name:28}{f"+- {own:.3g}":>10}  +- {other:.3g} m{each.unit}')
-    return '\n'.join([*lines, f'{given.design} poses: {folder / DESIGNED_POSES}; {way}'])
+    return '\n'.join([*lines, f'{given.design} poses: {folder / DESIGNED_POSES}; '
+                      f'{motion.times[-1]:.0f} s through them: {folder / WAY_THROUGH_POSES}'])

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
-from stewart_dynamics.errors import KindError, ParameterError, shown_name
+from stewart_dynamics.errors import ParameterError, shown_name
 from stewart_dynamics.legs.crank import CRANK
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.legs.telescopic import TELESCOPIC
@@ -57,12 +57,12 @@ def without_alternatives(changes: Mapping[str, Any]) -> dict[str, None]:
 
 def require_kind(parameters: Parameters, feature: str, *kinds: LegKind) -> None:
     """
-    Raise KindError if a feature is not available for the legs of a hexapod.
+    Raise ParameterError if a feature is not available for the legs of a hexapod.
 
     feature: its name in the error. kinds: those that have it, by default telescopic legs alone.
     """
     known = kinds or (TELESCOPIC,)
     if parameters.leg_kind not in known:
-        raise KindError(
+        raise ParameterError(
             f'{parameters.source}: {parameters.leg_kind.marker}: {feature}: available for '
             f'{" and ".join(each.name for each in known)} legs alone')
