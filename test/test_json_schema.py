@@ -39,7 +39,7 @@ def validator() -> jsonschema.Draft7Validator:
 
 
 def errors(text: str) -> list[str]:
-    """Return what is wrong with parameters of a node."""
+    """Return the errors in parameters of a node."""
     document = {'/**': {'ros__parameters': yaml.safe_load(text)}}
     return [error.message for error in validator().iter_errors(document)]
 

@@ -120,7 +120,7 @@ class InputStream:
 
     def _bound(self, count: int, topics: Integers, times: Stamps, data: Any, starts: Integers,
                sizes: Integers) -> tuple[Joined, Callable[[], object]]:
-        """Return the memory of what messages give, and the call that joins them."""
+        """Return the memory for the numbers of messages, and the call that joins them."""
         given, room, events, progress = self._ends
         memory = Joined(
             np.empty(count, np.int64), np.empty((count, SETPOINT)), np.empty(count, np.int64),
