@@ -228,6 +228,7 @@ EDITS = {
 PROGRAM = """
 import sys
 
+import numpy as np
 from stewart_dynamics import (
     BaseMotion, GovernedStream, Motion, ParameterError, Parameters, StewartPlatform)
 from stewart_dynamics.legs import KINDS
