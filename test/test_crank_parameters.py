@@ -239,6 +239,21 @@ def test_a_home_pose_that_is_not_found_or_decides_no_branch_is_one_line(
     snapshot(found.value)
 
 
+def test_limits_in_degrees_are_named_before_the_branch_that_they_leave_open() -> None:
+    parameters = RIG.replaced({'limits.angle_min': -50.0, 'limits.angle_max': 50.0,
+                               'geometry.crank_branch': 'auto'})
+    with pytest.raises(ParameterError, match=r': limits.angle_min: -50 rad: in degrees\?$'):
+        StewartPlatform(parameters)
+
+
+@pytest.mark.parametrize(('degrees', 'advice'), [
+    (382.0, 'subtract a turn, or in degrees?'), (1000.0, ': in degrees?')])
+def test_an_angle_of_more_than_a_turn_is_rejected(degrees: float, advice: str) -> None:
+    with pytest.raises(ParameterError) as found:
+        RIG.replaced({'geometry.crank_angles': np.full(6, math.radians(degrees))})
+    assert str(found.value).endswith(advice)
+
+
 def test_a_branch_that_is_given_needs_no_home_pose() -> None:
     given = RIG.replaced({'limits.angle_min': -4.0, 'limits.angle_max': 4.0,
                           'geometry.crank_branch': ['positive'] * 5 + ['negative']})

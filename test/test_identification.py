@@ -359,6 +359,16 @@ def test_efforts_of_motors_need_the_drive(
         assert 'likely actuator.screw_lead, 0.04 m, is wrong: about 0.0' in err
 
 
+def test_a_table_is_rejected_with_the_way_to_a_bag(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / 'legs.csv'
+    table.write_text('t,leg_1,effort_1\n0,0,0\n')
+    assert main([str(table), '--params', str(FILE), '--output', str(tmp_path / 'found')]) == 2
+    err = capsys.readouterr().err
+    assert 'legs.csv: a table: measured legs are read from bags' in err
+    assert 'docs/identify_from_bags.md' in err
+
+
 def test_forces_given_as_torques_of_motors_are_named(
         identified: Callable[..., Any], tmp_path: Path, snapshot: Snapshot) -> None:
     """A few hundred times too large, they all are beyond limits.force_max, where it is given."""

@@ -132,9 +132,11 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
         'samples': found.samples, 'efforts_left_out': found.unsound,
         'efforts_outliers': found.outliers,
         'parameters': parameters,
-        'combinations': combined(
+        # A single parameter is none of them: its interval is too wide by the lack of fit.
+        'combinations': [each for each in combined(
             what, [u.names[n] for n in asked], [u.units[n] for n in asked],
-            found.fit.values[asked], found.fit.covariance[np.ix_(asked, asked)], unclear),
+            found.fit.values[asked], found.fit.covariance[np.ix_(asked, asked)], unclear,
+            (errors - found.fit.deviations)[asked]) if len(each['parameters']) > 1],
         **_base_parameters(found, sure),
         'rank': what.rank, 'unknowns': len(asked), 'singular_values': what.singular_values,
         'residuals': _residuals(p, found.residuals),

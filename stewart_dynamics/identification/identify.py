@@ -43,6 +43,7 @@ from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import FIXED, NEGATIVE, Parameters
 from stewart_dynamics.reporting.estimates import LikelyMistake
+from stewart_dynamics.tables.reading import is_table
 
 # Minimum number of samples per cut-off period; slowly sampled bags get a lower cut-off.
 _FEWEST_SAMPLES = 10.0
@@ -205,6 +206,9 @@ class Identification:
     def read(self, path: Path, progress: Callable[[int], None] | None = None) -> None:
         """Read a bag; raise BagError if it cannot be read, or contains no usable data."""
         options = self._options
+        if is_table(path):
+            raise BagError(f'{path}: a table: measured legs are read from bags; '
+                           'docs/identify_from_bags.md has a script that writes one from a table')
         with closing(Recording(path)) as recording:
             topics = find_topics(recording, options.node, options.measured, options.efforts)
             needed = 2.0 * time_for_filters(options.cutoff)

@@ -460,6 +460,8 @@ class Crank(LegKind):
                 f'{parameters["legs.rod.length"][leg]:.6g} m: does not reach the platform joint '
                 'at home, from which geometry.crank_branch: auto follows')
         if undecided:
+            for mistake in crank_mistakes.limits_in_degrees(parameters):
+                raise ParameterError(f'{parameters.source}: {mistake}')
             both, leg = divmod(undecided - 1, 6)
             up, down = (angles[leg].round(9) + 0.0).tolist()  # no -3e-16
             words = 'both are possible' if both else 'neither is likely'

@@ -57,10 +57,9 @@ def wrong_sizes(p: Parameters, ends: Array) -> Iterator[str]:
             found = True
             yield (f'{name}: {p[name].max():.3g} m, but the joints are {size:.3g} m from their '
                    'center: in mm?')
-    for name in ('limits.angle_min', 'limits.angle_max'):
-        if p[name] is not None and np.abs(p[name]).max() > _LARGEST_ANGLE:
-            found = True
-            yield f'{name}: {p[name][np.argmax(np.abs(p[name]))]:.3g} rad: in degrees?'
+    for mistake in limits_in_degrees(p):
+        found = True
+        yield mistake
     if found:
         return
     gap = gap_of(p, ends)
@@ -69,6 +68,13 @@ def wrong_sizes(p: Parameters, ends: Array) -> Iterator[str]:
         yield (f'{ROD_LENGTH}: {rod:.3g} m: shorter than the gap of {gap:.3g} m between the '
                'platform joints and the ends of the cranks, level and at the middle of their '
                'angles: one of the lengths or radii in mm, or the legs in another order?')
+
+
+def limits_in_degrees(p: Parameters) -> Iterator[str]:
+    """Yield limits of the angles that no crank reaches, which are likely in degrees."""
+    for name in ('limits.angle_min', 'limits.angle_max'):
+        if p[name] is not None and np.abs(p[name]).max() > _LARGEST_ANGLE:
+            yield f'{name}: {p[name][np.argmax(np.abs(p[name]))]:.3g} rad: in degrees?'
 
 
 def gap_of(p: Parameters, ends: Array) -> float:
@@ -270,8 +276,9 @@ def _bodies(p: Parameters, centers: Array, inertias: Array) -> Iterator[str]:
         yield (f'legs.crank.center_of_mass: {away[at]:.3g} m from the axis of the motor, but the '
                f'crank is {sizes[at]:.3g} m long: in mm?')
     yield from _gyration('legs.crank', masses, inertias[:, 5], sizes)
-    if p['legs.crank.inertia'].shape != (1,):  # which is that about the axis alone
-        for inertia in inertias:
+    # Those about the axis alone are no bodies: of a file, and of cranks that are identified.
+    for inertia in inertias:
+        if inertia[:5].any():
             words = tuple(impossible_inertia(
                 'legs.crank.inertia', np.linalg.eigvalsh(
                     inertia[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]), 'xx xy xz yy yz zz'))

@@ -188,6 +188,8 @@ def _broken_rule(parameter: Parameter, entry: Any) -> str:
 
 # Parameters of at most this time are pulses of servos: 0.5 to 2.5 ms, 500 to 2500 us [s].
 _LONGEST_OF_PULSES, _IN_MICROSECONDS = 0.1, 100.0
+# Angles of up to one turn more than the largest are likely sums of two, as of a pair and a horn.
+_TURN = 2.0 * math.pi  # [rad]
 
 
 def _other_unit(parameter: Parameter, entry: float) -> str:
@@ -195,7 +197,8 @@ def _other_unit(parameter: Parameter, entry: float) -> str:
     if abs(entry) <= parameter.maximum:
         return ''
     if parameter.unit == 'rad':
-        return ': in degrees?'
+        a_turn_more = parameter.maximum >= _TURN and abs(entry) <= 2.0 * _TURN
+        return ': subtract a turn, or in degrees?' if a_turn_more else ': in degrees?'
     if parameter.unit == 's' and parameter.maximum < _LONGEST_OF_PULSES and entry > 0.0:
         return ': in microseconds?' if entry >= _IN_MICROSECONDS else ': in ms?'
     return ''

@@ -64,17 +64,23 @@ def estimate(name: str, unit: str, start: float, value: float, state: str, error
 
 
 def combined(what: Identifiability, names: Sequence[str], units: Sequence[str], values: Array,
-             covariance: Array, unclear: Integers | None = None) -> list[dict[str, Any]]:
-    """Return the combinations of parameters that are identifiable, for JSON."""
+             covariance: Array, unclear: Integers | None = None,
+             widening: Array | None = None) -> list[dict[str, Any]]:
+    """
+    Return the combinations of parameters that are identifiable, for JSON.
+
+    widening: added to the standard error of each parameter, as where there is a lack of fit.
+    """
     result = []
     for each in combinations(what, unclear):
         places = list(each.parameters)
         c = each.coefficients
         variance = float(c @ covariance[np.ix_(places, places)] @ c)
+        wider = 0.0 if widening is None else float(np.abs(c) @ widening[places])
         result.append({
             'parameters': [names[n] for n in places], 'coefficients': c,
             'unit': units[places[0]], 'value': c @ values[places],
-            'standard_error': math.sqrt(max(variance, 0.0)),
+            'standard_error': math.sqrt(max(variance, 0.0)) + wider,
             'words': in_words(c, [names[n] for n in places])})
     return result
 
