@@ -459,11 +459,12 @@ def test_what_limits_nothing_and_what_is_not_known() -> None:
         c.velocity(home, np.eye(6)[0])
     motion = Motion.of_rows(np.repeat(Motion.from_pose(home).rows[None], 3, axis=0))
     for ask in (lambda: c.speed_factor(motion, times=[0, 1, 2]),
-                lambda: c.amplitude_factor(motion, times=[0, 1, 2]),
-                lambda: c.payload(motion, [0, 0, 0], times=[0, 1, 2]),
-                lambda: c.clearance(home)):
-        with pytest.raises(ParameterError, match='available for telescopic legs alone'):
+                lambda: c.payload(motion, [0, 0, 0], times=[0, 1, 2])):
+        with pytest.raises(ParameterError, match='not set: without a limit there is no answer'):
             ask()
+    assert c.amplitude_factor(motion, times=[0, 1, 2]).value == np.inf  # it stays where it is
+    with pytest.raises(ParameterError, match='available for telescopic legs alone'):
+        c.clearance(home)
     with pytest.raises(MotionError, match='all six numbers are zero'):
         c.travel(home, np.zeros(6))
 
