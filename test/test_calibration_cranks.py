@@ -273,6 +273,31 @@ def test_one_pose_gives_the_zeros() -> None:
     assert np.isfinite(two.errors).all()
 
 
+def test_units_of_angles_of_one_pose_are_named() -> None:
+    """One pose has as many residuals as zeros: any unit leaves none of them."""
+    angles, poses = tooth({1: 14.4}).measure(seeded(6), 1, 0.0)
+    platform = StewartPlatform(RIG)
+    for wrong, words in (
+            (np.degrees(angles), 'angles of the legs are in degrees, not in rad: --degrees reads '
+             'them so (zeros are then '),
+            (1500.0 + 300.0 * angles, 'turns: likely degrees, pulses or increments')):
+        with pytest.raises(StewartError) as caught:
+            calibrate(platform, wrong, poses, unknowns=['zero'])
+        assert words in str(caught.value)
+
+
+def test_equal_poses_and_angles_of_any_scale_have_no_other_unit() -> None:
+    built = tooth({1: 14.4})
+    angles, poses = built.measure(seeded(6), 1, 0.0)
+    ten = np.zeros(10, dtype=int)
+    found = calibrate(built.platform, angles[ten], poses[ten], unknowns=['zero'])
+    assert_allclose(found.values, built.values(), atol=1e-9)
+    angles, poses = built.measure(seeded(6), 60)
+    with pytest.raises(StewartError) as caught:
+        calibrate(built.platform, 1500.0 + 640.0 * angles, poses, unknowns=['zero'])
+    assert '; or ' not in str(caught.value)
+
+
 def test_too_few_poses_and_wrong_names_are_rejected(snapshot: Snapshot) -> None:
     built = Built(RIG)
     angles, poses = built.measure(seeded(6), 12)
