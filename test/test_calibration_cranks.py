@@ -386,6 +386,15 @@ def test_designed_poses_are_within_the_limits_and_identify_better() -> None:
         assert_allclose(errors[free], found.half_widths[free], rtol=1e-3)
 
 
+def test_poses_that_are_designed_for_zeros_are_not_worse_than_random_ones() -> None:
+    """The noise of a pose, which all legs share, decides how well zeros are known."""
+    rig = StewartPlatform.from_yaml(
+        ROOT / 'stewart_dynamics' / 'legs' / 'examples' / 'cranks.yaml')
+    design = design_poses(rig, 5, groups=('zero',))
+    zeros = design.legs.zero
+    assert design.half_widths[zeros].max() < 1.1 * design.random_half_widths[zeros].max()
+
+
 @pytest.fixture(scope='module')
 def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a file of 40 poses with noise; leg_2 sits on another tooth."""
