@@ -39,7 +39,7 @@ from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejections
 from stewart_dynamics.setpoints.step import Batch
 
 MEASURED, MEASURED_POSE = 'measured', 'measured_pose'
-# Slow motion that is smaller or larger by these factors is of another unit: degrees are 0.0175 rad.
+# Slow motion that is smaller or larger by these factors has another unit; a degree is 0.0175 rad.
 _SMALLEST, _LARGEST = 0.025, 20.0
 NO_POSE = 'no pose has these'  # positions of the drives
 
@@ -203,8 +203,8 @@ def _unit_notices(axes: Mapping[str, Any], topic: str) -> list[str]:
                 off[name] = gain
         if off:
             notices.append(
-                f'{topic}: slow motion of {", ".join(off)} is {next(iter(off.values())):.3g} times '
-                f'that of the setpoints: likely another unit of {words}')
+                f'{topic}: slow motion of {", ".join(off)} is {next(iter(off.values())):.3g} '
+                f'times that of the setpoints: likely another unit of {words}')
     return notices
 
 

@@ -69,7 +69,7 @@ def smallest_eigenvalue(ten: Array) -> float:
 
 
 def thickened(ten: Array) -> Array:
-    """Return the parameters (10,) of a plate or a rod as those of a body that is a little thick."""
+    """Return the parameters (10,) of a plate or a rod that is made a little thick."""
     pseudo = pseudo_inertia(ten)
     added = _THICKNESS * float(np.diag(pseudo)[:3].max())
     return inertial_parameters(pseudo + np.diag([added, added, added, 0.0]))
