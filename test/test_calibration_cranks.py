@@ -273,6 +273,31 @@ def test_one_pose_gives_the_zeros() -> None:
     assert np.isfinite(two.errors).all()
 
 
+def test_units_of_angles_of_one_pose_are_named() -> None:
+    """One pose has as many residuals as zeros: any unit leaves none of them."""
+    angles, poses = tooth({1: 14.4}).measure(seeded(6), 1, 0.0)
+    platform = StewartPlatform(RIG)
+    for wrong, words in (
+            (np.degrees(angles), 'angles of the legs are in degrees, not in rad: --degrees reads '
+             'them so (zeros are then '),
+            (1500.0 + 300.0 * angles, 'turns: likely degrees, pulses or increments')):
+        with pytest.raises(StewartError) as caught:
+            calibrate(platform, wrong, poses, unknowns=['zero'])
+        assert words in str(caught.value)
+
+
+def test_equal_poses_and_angles_of_any_scale_have_no_other_unit() -> None:
+    built = tooth({1: 14.4})
+    angles, poses = built.measure(seeded(6), 1, 0.0)
+    ten = np.zeros(10, dtype=int)
+    found = calibrate(built.platform, angles[ten], poses[ten], unknowns=['zero'])
+    assert_allclose(found.values, built.values(), atol=1e-9)
+    angles, poses = built.measure(seeded(6), 60)
+    with pytest.raises(StewartError) as caught:
+        calibrate(built.platform, 1500.0 + 640.0 * angles, poses, unknowns=['zero'])
+    assert '; or ' not in str(caught.value)
+
+
 def test_too_few_poses_and_wrong_names_are_rejected(snapshot: Snapshot) -> None:
     built = Built(RIG)
     angles, poses = built.measure(seeded(6), 12)
@@ -359,6 +384,15 @@ def test_designed_poses_are_within_the_limits_and_identify_better() -> None:
         fitted = fit(Equations(LEGS, found.positions, found.poses), unknowns, NOISE)
         errors = TWO_SIDED * np.sqrt(np.diag(fitted.covariance))[GEOMETRY]
         assert_allclose(errors[free], found.half_widths[free], rtol=1e-3)
+
+
+def test_poses_that_are_designed_for_zeros_are_not_worse_than_random_ones() -> None:
+    """The noise of a pose, which all legs share, decides how well zeros are known."""
+    rig = StewartPlatform.from_yaml(
+        ROOT / 'stewart_dynamics' / 'legs' / 'examples' / 'cranks.yaml')
+    design = design_poses(rig, 5, groups=('zero',))
+    zeros = design.legs.zero
+    assert design.half_widths[zeros].max() < 1.1 * design.random_half_widths[zeros].max()
 
 
 @pytest.fixture(scope='module')

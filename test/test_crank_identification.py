@@ -307,6 +307,16 @@ def test_torques_and_currents_of_motors_show_the_same(
     assert low < 185.0 < high and high - low < 0.1 * 185.0
 
 
+def test_a_plate_is_identified() -> None:
+    """A file may have a disc without thickness, on the bound of what a body can have."""
+    disc = {'platform.inertia': [24.0, 0.0, 0.0, 24.0, 0.0, 48.0]}
+    truth = Truth(GIVEN.replaced({**disc, 'platform.mass': 185.0}))
+    for seed in (1, 2):
+        found = found_in(recorded_of(truth, 'rich', seed, SENSORS, SECONDS, RATE),
+                         GIVEN.replaced(disc), 'mass', 'inertia')
+        assert found.parameters['platform.mass'] == pytest.approx(185.0, rel=0.05)
+
+
 def test_currents_need_the_torque_constant(run: Callable[..., Any], snapshot: Snapshot) -> None:
     code, _, _, err = run('--motor-current')
     assert code == 2

@@ -254,3 +254,15 @@ def test_limits_of_angles_beyond_a_servo_are_named(limits: dict[str, Any], found
     assert len(words) == bool(found)
     assert all(f'limits.angle_max: {found}: the servo of leg_4 ends at 0.9 rad' in each
                for each in words)
+
+
+def test_the_servo_that_ends_farthest_from_a_limit_is_named() -> None:
+    """As after the calibration of a horn on another tooth."""
+    example = Parameters.from_yaml(ROOT / 'stewart_dynamics' / 'legs' / 'examples' / 'cranks.yaml')
+    first, last = (example[f'servo.angle_at_{end}'].copy() for end in ('min', 'max'))
+    for leg, zero in ((1, -0.01), (2, 0.25)):
+        first[leg] += zero
+        last[leg] += zero
+    (found,) = [each for each in StewartPlatform(example.replaced(
+        {'servo.angle_at_min': first, 'servo.angle_at_max': last})).check() if 'servo' in each]
+    assert 'leg_3 ends at -0.535 rad' in found

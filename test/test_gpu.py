@@ -329,7 +329,15 @@ def test_errors(snapshot: Snapshot) -> None:
         snapshot(f'{name}: {type(error.value).__name__}: {error.value}')
 
 
+@pytest.mark.parametrize('seed', [-1, 1.5, 'a'])
+def test_seeds_that_are_none_are_rejected(seed: Any) -> None:
+    with pytest.raises(MotionError, match='^uncertainty: .*: must be an integer of 0 or more$'):
+        Hexapods(PLATFORM, 2, uncertainty=seed, device='cpu')
+
+
 def test_too_little_memory_is_one_line() -> None:
+    with pytest.raises(DeviceError, match='^too little memory for the parameters of [^\n]+$'):
+        Hexapods(PLATFORM, 10 ** 12, device='cpu')
     rows = np.broadcast_to(np.zeros((1, 24)), (10 ** 12, 1, 24))
     with pytest.raises(DeviceError, match='^inverse_dynamics: too little memory: [^\n]+$'):
         Hexapods(PLATFORM, device='cpu').inverse_dynamics(rows)

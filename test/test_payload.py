@@ -311,6 +311,13 @@ def test_an_inertia_that_no_body_has_is_not_given() -> None:
         HEXAPOD['platform.inertia'].tolist())
 
 
+def test_the_inertia_of_a_plate_that_is_kept_is_one_of_a_body() -> None:
+    plate = HEXAPOD.replaced({'platform.inertia': [13.0, 0.0, 0.0, 13.0, 0.0, 26.0]})
+    outcome = outcome_of(recorded(at_rest), plate)
+    assert 'not identified, as in the parameters' in outcome.message
+    assert 'no real body' not in outcome.message
+
+
 def test_too_few_measurements_are_rejected_with_the_reason() -> None:
     for history, said in (
             (LegHistory(10.0), 'no measured legs'),

@@ -17,7 +17,7 @@ from stewart_dynamics import ParameterError
 from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters, PLATFORM
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
     from_log_cholesky, inertial_parameters, is_consistent, log_cholesky, log_cholesky_derivative,
-    pseudo_inertia)
+    pseudo_inertia, smallest_eigenvalue, thickened)
 
 Array = NDArray[np.float64]
 
@@ -75,3 +75,14 @@ def test_invalid_bodies_are_rejected(
     assert not is_consistent(ten)
     with snapshot.raises(ParameterError):
         log_cholesky(ten)
+
+
+@pytest.mark.parametrize('inertia', [(1.0, 1.0, 2.0), (1.0, 1.0, 0.0)], ids=['plate', 'rod'])
+def test_a_plate_and_a_rod_become_a_little_thick(inertia: tuple[float, float, float]) -> None:
+    ten = np.array([2.0, 0.2, 0.0, 0.1, inertia[0], 0.0, 0.0, inertia[1], 0.0, inertia[2]])
+    ten[4:] += 2.0 * np.array([0.05 ** 2, 0.0, -0.1 * 0.05, 0.1 ** 2 + 0.05 ** 2, 0.0, 0.1 ** 2])
+    assert abs(smallest_eigenvalue(ten)) < 1e-12
+    thick = thickened(ten)
+    assert is_consistent(thick)
+    np.testing.assert_allclose(from_log_cholesky(log_cholesky(thick)), thick, atol=1e-12)
+    np.testing.assert_allclose(thick, ten, atol=3e-3)

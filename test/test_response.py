@@ -290,6 +290,19 @@ def test_a_known_drive_is_found_from_a_table_of_a_tracker(
             summary['response'][name]['bandwidth_3db'], rel=0.01)
 
 
+def test_achieved_poses_in_another_unit_are_named(
+        commanded: tuple[Array, Motion], tmp_path: Path) -> None:
+    times, motion = commanded
+    at, rows = seen_by_a_tracker(motion)
+    bag = write_bag(tmp_path / 'moved', motion, times, {})
+    table = table_of(tmp_path / 'tracker.csv', rows, START * 1e-9 + at)
+    table.write_text(table.read_text().replace(' (mm)', ''))
+    summary = replayed(bag, tmp_path / 'same', '--measured-pose', str(table), '--no-report')
+    (notice,) = [each for each in summary['notices'] if 'unit' in each]
+    assert notice.startswith(f'{table}: slow motion of x, y, z is 1e+03 times that of the setpoi')
+    assert notice.endswith(': likely another unit of lengths in m')
+
+
 def test_setpoints_and_achieved_poses_in_tables_share_a_clock(
         commanded: tuple[Array, Motion], tmp_path: Path) -> None:
     times, motion = commanded

@@ -33,6 +33,13 @@ from stewart_dynamics.reporting.estimates import LikelyMistake
 
 # A mistake is likely if the misfit without it is smaller than this part.
 _BETTER = 0.25
+# No mistake explains poses with a larger misfit, and none shows in poses that move the drives less
+# than this part of their unit [m, rad].
+_EXPLAINED, _SAME = 0.7, 1e-6
+# Fewer poses have another unit of angles if the zeros are off by more than this [rad].
+_LARGE_TURN = 0.3
+# Cranks do not make more turns from zero.
+_MOST_TURNS = 2.0
 # Mistakes explain the poses alike if their misfits differ by this factor, or are below this value.
 _ALIKE, _EXACT = 2.0, 1e-3
 # Largest scale of positions that is tried and how near, logarithms; a misfit above all others.
@@ -50,7 +57,8 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
                       angles: Array | None, degrees: bool, millimeters: Millimeters,
                       ) -> Iterator[LikelyMistake]:
     """Yield the likeliest mistake in positions, poses or their angles (N, 3), if one is likely."""
-    if len(equations.positions) < _FEWEST:
+    if len(equations.positions) < _FEWEST or not _moved(equations):
+        yield from _unit_of_few(equations, degrees)
         yield from _on_other_side(parameters, equations, unknown_frames)
         return
     given = _misfit(parameters, equations, unknown_frames)
@@ -75,7 +83,7 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
     if best >= _BETTER * given:
         tried = list(_of_scale(parameters, equations, unknown_frames)) or tried
         best, mistake = min(tried, key=lambda each: each[0])
-    if best < _BETTER * given:
+    if best < min(_BETTER * given, _EXPLAINED):
         # Symmetric hexapods: a mirrored frame is another order of the legs.
         texts = [each.text for misfit, each in tried if misfit <= max(_ALIKE * best, _EXACT)]
         yield mistake._replace(text=f'{"; or ".join(texts)} (misfit {best:.2g} of the motion'
@@ -83,6 +91,39 @@ def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_fram
                                + _likelihood(equations, best, given) + ')')
     else:
         yield from _on_other_side(parameters, equations, unknown_frames)
+
+
+def _moved(equations: Equations) -> bool:
+    """Return whether the poses differ from one another."""
+    _, motions = _compared(equations)
+    return max(map(_spread, motions)) > _SAME
+
+
+def _unit_of_few(equations: Equations, degrees: bool) -> Iterator[LikelyMistake]:
+    """Yield another unit of angles that a few poses, or one, show by the zeros they lead to."""
+    if not equations.legs.signs:
+        return
+    unit, = equations.legs.units.values()
+    given, by_unit = (_from_file(equations._replace(positions=factor * equations.positions))
+                      for factor in (1.0, unit))
+    largest = float(np.abs(equations.positions).max())
+    if not degrees and given > _LARGE_TURN and by_unit < _BETTER * given:
+        yield LikelyMistake('unit', (
+            f'{_unit_words((1.0, unit), Millimeters(), degrees, equations)} (zeros are then '
+            f'{math.degrees(by_unit):.2g} deg from those of the file, root mean square, instead '
+            f'of {math.degrees(given):.2g} deg)'))
+    elif largest > _MOST_TURNS * 2.0 * math.pi:
+        yield LikelyMistake('unit', (
+            f'{_name_of(equations)} are up to {largest:.3g} rad, {largest / (2.0 * math.pi):.3g} '
+            'turns: likely degrees, pulses or increments'))
+
+
+def _from_file(equations: Equations) -> float:
+    """Return how far drives that turn are from where the file has them, root mean square."""
+    legs = equations.legs
+    values = values_of(legs, equations.frames)
+    off = legs.zero_guesses(equations.vectors(values), equations.positions)
+    return float(np.sqrt(np.mean(off ** 2)))
 
 
 def _likelihood(equations: Equations, best: float, given: float) -> str:

@@ -6,8 +6,8 @@ Poses that identify the geometry best, within the limits of the hexapod.
 
 From random poses within the limits, the N with the largest determinant of information are chosen
 (D-optimal), leg by leg: the exchange of one chosen pose for another that increases it most is
-repeated (V. V. Fedorov, Theory of Optimal Experiments, Academic Press, 1972). Equal seeds give
-equal poses.
+repeated (V. V. Fedorov, Theory of Optimal Experiments, Academic Press, 1972). Random poses are
+taken instead where their predicted intervals are smaller. Equal seeds give equal poses.
 """
 
 from __future__ import annotations
@@ -92,11 +92,17 @@ def design_poses(platform: StewartPlatform, count: int, noise: Noise = NOISE, se
     rows = np.stack([lin.derivatives[:, n, columns] / deviations[:, n, None]
                      * unknowns.scales[columns] for n, columns in enumerate(of_leg)])
     chosen = _exchange(rows, random.choice(len(candidates), count, replace=False))
-    others = [half_widths(random.choice(len(candidates), count, replace=False))
-              for _ in range(_RANDOM)]
+    drawn = [random.choice(len(candidates), count, replace=False) for _ in range(_RANDOM)]
+    others = [half_widths(each) for each in drawn]
+    # The exchange knows no correlation of the legs, by the noise of the poses that they share.
+    # Where it counts most, as for zeros alone, random poses may be better.
+    predicted = half_widths(chosen)
+    chosen, predicted = min(
+        zip([chosen, *drawn], [predicted, *others], strict=True),
+        key=lambda each: float(np.log(each[1][~held]).sum()))
     found = candidates[_in_order(candidates[chosen], platform.home_pose(), size, chosen)]
     return PoseDesign(found, legs.measured_positions(platform.inverse_kinematics(found)),
-                      half_widths(chosen), np.median(others, axis=0), legs)
+                      predicted, np.median(others, axis=0), legs)
 
 
 def _within_limits(platform: StewartPlatform, random: np.random.Generator, count: int) -> Pose:

@@ -145,8 +145,8 @@ class BodyFit:
         known = half_widths < IDENTIFIABLE * of_file
         body = self._body(change)
         inertia = np.where(known[INERTIA], body.inertia, self._given.inertia)
-        consistent = body.mass > 0.0 and is_consistent(
-            np.array([body.mass, 0.0, 0.0, 0.0, *inertia]))
+        consistent = body.mass > 0.0 and (not known[INERTIA].any() or is_consistent(
+            np.array([body.mass, 0.0, 0.0, 0.0, *inertia])))
         if not consistent:
             known[INERTIA] = False
             inertia = self._given.inertia

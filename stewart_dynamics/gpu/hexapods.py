@@ -144,12 +144,14 @@ class Hexapods:
             raise wrong_type('count', count, f'a positive multiple of {number} platforms')
         if uncertainty is not None and parameters:
             raise wrong_type('uncertainty', uncertainty, 'None where parameters are given')
+        if uncertainty is not None and not (isinstance(uncertainty, int) and uncertainty >= 0):
+            raise wrong_type('uncertainty', uncertainty, 'an integer of 0 or more')
         self._backend: Any = _backend_of(device)
         self.xp: Any = self._backend.xp
         self.device: str = self._backend.name
-        blocks = np.repeat(np.arange(number), self.count // number)
         self._own = {name: _on_host(name, value) for name, value in (parameters or {}).items()}
         try:
+            blocks = np.repeat(np.arange(number), self.count // number)
             if uncertainty is not None:
                 structures = np.concatenate([
                     uncertain_structures(each, self.count // number, uncertainty + n)

@@ -38,7 +38,7 @@ from stewart_dynamics.identification.extraction import BAND, Extract, Extracts, 
 from stewart_dynamics.identification.unknowns import CENTER, ORIGINS, PLATFORM, Unknowns
 from stewart_dynamics.mechanics.dynamics.linear_parameters import inertial_derivative
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
-    from_log_cholesky, log_cholesky, log_cholesky_derivative, smallest_eigenvalue)
+    from_log_cholesky, log_cholesky, log_cholesky_derivative, smallest_eigenvalue, thickened)
 from stewart_dynamics.parameters.table import Parameters
 
 _STEPS = 30
@@ -338,7 +338,10 @@ def _body(unknowns: Unknowns, values: Array, covariance: Array) -> Array:
     def candidate(eta: Array) -> Array:
         return unknowns.with_inertial(values, units * from_log_cholesky(eta))
 
-    eta = log_cholesky(unknowns.inertial(unknowns.start) / units)
+    start = unknowns.inertial(unknowns.start) / units
+    if smallest_eigenvalue(start) < _SMALLEST_BODY:  # the platform of the file is a plate
+        start = thickened(start)
+    eta = log_cholesky(start)
     found = candidate(eta)
     damping = 1e-3
     for _ in range(_BODY_STEPS):

@@ -226,16 +226,19 @@ def _servos(p: Parameters, angles: Array) -> Iterator[str]:
                f'home, {_rounded(angles[at]):.3g} rad: angles of the horn on another zero, or a '
                'sign? They are angles of the crank')
         return
+    found: list[tuple[float, str]] = []
     for name, ends, sign in (('limits.angle_max', most, 1.0), ('limits.angle_min', least, -1.0)):
         limit: Array | None = p[name]
         missing = sign * ((sign * _LARGEST_ANGLE if limit is None else limit) - ends)
         at = int(np.argmax(missing))
         if missing[at] > _ALIKE_WHERE_EQUAL:
             given = 'not set' if limit is None else f'{limit[at]:.3g} rad'
-            yield (f'{name}: {given}: the servo of {p.joints[at]} ends at {ends[at]:.3g} rad, by '
-                   'servo.*: no pulse turns it to angles in between; limit the angle to that of '
-                   'the servo')
-            return
+            found.append((float(missing[at]), (
+                f'{name}: {given}: the servo of {p.joints[at]} ends at {ends[at]:.3g} rad, by '
+                'servo.*: no pulse turns it to angles in between; limit the angle to that of '
+                'the servo')))
+    if found:
+        yield max(found, key=lambda each: round(each[0], 9))[1]
 
 
 def _rounded(angle: Any) -> float:

@@ -32,12 +32,15 @@ from stewart_dynamics.response.clock_alignment import aligned, overlaps
 from stewart_dynamics.response.even_samples import (
     at_even_times, check_overlap, clock_notices, Runs, Track, Tracks, without_frozen)
 from stewart_dynamics.response.frequency_response import signal_module
+from stewart_dynamics.response.response_measures import COHERENT
 from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.input_messages import SampleReader
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejections
 from stewart_dynamics.setpoints.step import Batch
 
 MEASURED, MEASURED_POSE = 'measured', 'measured_pose'
+# Slow motion that is smaller or larger by these factors has another unit; a degree is 0.0175 rad.
+_SMALLEST, _LARGEST = 0.025, 20.0
 NO_POSE = 'no pose has these'  # positions of the drives
 
 
@@ -181,9 +184,28 @@ class RecordedResponse:
         self.notices += [
             f'{self._topic}: {name} moves opposite to its setpoints: the sign of an axis differs'
             for name in AXES if axes[name]['opposite']]
+        self.notices += _unit_notices(axes, self._topic)
         return Followed({
             **axes, **legs, 'topic': self._topic, 'samples': len(measured.stamps),
             'rate': samples.rate, 'highest_frequency': samples.highest}, samples)
+
+
+def _unit_notices(axes: Mapping[str, Any], topic: str) -> list[str]:
+    """Return notices of shifts and of turns whose scale at low frequencies no drive has."""
+    notices = []
+    for names, words in ((AXES[:3], 'lengths in m'), (AXES[3:], 'angles in rad')):
+        off = {}
+        for name in names:
+            axis = axes[name]
+            slowest = np.flatnonzero(np.asarray(axis['coherence']) >= COHERENT)[:1]
+            gain = float(np.asarray(axis['gain'])[slowest[0]]) if len(slowest) else 1.0
+            if axis['reason'] is None and not _SMALLEST < gain < _LARGEST:
+                off[name] = gain
+        if off:
+            notices.append(
+                f'{topic}: slow motion of {", ".join(off)} is {next(iter(off.values())):.3g} '
+                f'times that of the setpoints: likely another unit of {words}')
+    return notices
 
 
 def axes_of(poses: Array, center: Array) -> Array:

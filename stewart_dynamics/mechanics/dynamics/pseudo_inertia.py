@@ -29,6 +29,7 @@ from stewart_dynamics.errors import ParameterError
 _ROWS = np.array([0, 1, 2, 0, 1, 0, 0, 1, 2])
 _COLUMNS = np.array([0, 1, 2, 1, 2, 2, 3, 3, 3])
 _DIAGONAL = 3  # of these nine the first are exponents
+_THICKNESS = 1e-3  # of a thickened body: its least second moment of mass, by the largest
 
 
 def pseudo_inertia(ten: Array) -> Array:
@@ -65,6 +66,13 @@ def smallest_eigenvalue(ten: Array) -> float:
     size = 1.0 / np.sqrt([moment, moment, moment, mass])
     values = np.linalg.eigvalsh(size[:, None] * pseudo * size)
     return float(values[0] / np.abs(values).max())
+
+
+def thickened(ten: Array) -> Array:
+    """Return the parameters (10,) of a plate or a rod that is made a little thick."""
+    pseudo = pseudo_inertia(ten)
+    added = _THICKNESS * float(np.diag(pseudo)[:3].max())
+    return inertial_parameters(pseudo + np.diag([added, added, added, 0.0]))
 
 
 def log_cholesky(ten: Array) -> Array:
