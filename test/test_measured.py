@@ -350,8 +350,7 @@ def test_a_contact_of_one_sample_has_one_time_in_the_summary() -> None:
     case = case_of(many=3000)
     load = np.zeros((3000, 6))
     load[[0, *range(1200, 1230)], 2] = -400.0
-    lines = _measured_lines(
-        {'headline': '', **values_of(case, case.forces(load))}, TELESCOPIC.effort)
+    lines = _measured_lines({'headline': '', **values_of(case, case.forces(load))}, TELESCOPIC)
     assert [line.partition(':')[0] for line in lines if line.startswith('contact')] == [
         'contact at t = 0.00 s', 'contact from t = 12.00 to 12.29 s']
 

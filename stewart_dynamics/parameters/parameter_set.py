@@ -199,8 +199,10 @@ def _other_unit(parameter: Parameter, entry: float) -> str:
     if parameter.unit == 'rad':
         a_turn_more = parameter.maximum >= _TURN and abs(entry) <= 2.0 * _TURN
         return ': subtract a turn, or in degrees?' if a_turn_more else ': in degrees?'
-    if parameter.unit == 's' and parameter.maximum < _LONGEST_OF_PULSES and entry > 0.0:
-        return ': in microseconds?' if entry >= _IN_MICROSECONDS else ': in ms?'
+    if parameter.unit == 's' and parameter.maximum < _LONGEST_OF_PULSES:
+        unit, size = (('microseconds', 1e-6) if entry >= _IN_MICROSECONDS else ('ms', 1e-3))
+        if parameter.minimum <= size * entry <= parameter.maximum:
+            return f': in {unit}?'
     return ''
 
 
