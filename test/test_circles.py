@@ -80,8 +80,8 @@ def test_changes_of_points_and_circles_take_the_place_of_each_other() -> None:
      'file: geometry.platform_joints: missing, it has no default; or give '
      'geometry.platform_radius and geometry.platform_angles'),
     ({'geometry.base_angles': [12.0, 108.0, 132.0, 228.0, 252.0, 348.0]},
-     'file: geometry.base_angles: 12.0 rad: must be at least -6.28319, at most 6.28319: in '
-     'degrees?'),
+     'file: geometry.base_angles: 12.0 rad: must be at least -6.28319, at most 6.28319: '
+     'subtract a turn, or in degrees?'),
     ({'geometry.base_radius': 0.0}, 'file: geometry.base_radius: 0.0 m: must be more than 0'),
     ({'geometry.platform_angles': [0.0, 2.0 * math.pi] * 3},
      'file: geometry.platform_angles: all six are at one point'),

@@ -101,7 +101,9 @@ def _view(root: ET.Element, left: float, title: str, base: Array, platform: Arra
     between = None if knees is None else (knees[:, 0] - middle) * place[0] + place[1]
     _text(root, left + 20.0, 24.0, title, font_weight='bold')
     for joints, color in ((base, ROLES['base']), (platform, ROLES['piston'])):
-        around = np.argsort(np.arctan2(*(joints - joints.mean(axis=0)).T[::-1]))
+        # Rounded as they are drawn: the order of a plate from its side is not one of last digits.
+        x, y = (joints - joints.mean(axis=0)).round(1).T + 0.0
+        around = np.argsort(np.arctan2(y, x), kind='stable')
         corners = ' '.join(f'{x:.1f},{y:.1f}' for x, y in joints[around])
         _draw(root, 'polygon', None, points=corners, fill=color, fill_opacity=0.5, stroke=color)
     for n, (color, begin, end) in enumerate(zip(LEG_COLORS, base, platform, strict=True)):
