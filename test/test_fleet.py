@@ -36,7 +36,7 @@ import termios
 import time
 from typing import Any
 
-from distributed import LocalCluster
+from distributed import Client, LocalCluster
 import messages
 import numpy as np
 import pytest
@@ -116,7 +116,7 @@ def bags(short: Path, long_bag: Path) -> Path:
 
 
 @pytest.fixture(scope='module')
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
+def two_workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
     made = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address='127.0.0.1:0',
                         silence_logs=logging.CRITICAL,
                         local_directory=f'{tmp_path_factory.mktemp("dask")}')
@@ -124,6 +124,14 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
     # Workers that tests have killed may end later than Dask waits; they are daemons.
     with suppress(TimeoutError, asyncio.TimeoutError):
         made.close()
+
+
+@pytest.fixture
+def cluster(two_workers: LocalCluster) -> LocalCluster:
+    """Return the cluster when both workers answer: another test may have killed one."""
+    with Client(two_workers, set_as_default=False) as client:
+        until(lambda: len(client.run(os.getpid, on_error='ignore')) == 2, 'two workers')
+    return two_workers
 
 
 def until(condition: Callable[[], Any], what: str) -> Any:
