@@ -308,7 +308,7 @@ def test_torques_and_currents_of_motors_show_the_same(
 
 
 def test_a_plate_is_identified() -> None:
-    """A file may have a disc without thickness, on the bound of what a body can have."""
+    """The inertia of a disc without thickness is on the bound of possible inertias."""
     disc = {'platform.inertia': [24.0, 0.0, 0.0, 24.0, 0.0, 48.0]}
     truth = Truth(GIVEN.replaced({**disc, 'platform.mass': 185.0}))
     for seed in (1, 2):

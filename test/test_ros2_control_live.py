@@ -97,6 +97,19 @@ def governed(program: Path, p: Parameters, stamps: Any, numbers: Array) -> tuple
     return found, Motion.of_rows(rows)
 
 
+def governed_within_limits(program: Path, p: Parameters, axes: Any, stamps: Any, demand: Motion,
+                           named: str) -> tuple[Any, Motion]:
+    """Return ``governed``, with the bits of Python's and within all limits."""
+    numbers, demand = to_references(demand)
+    found, motion = governed(program, p, stamps, numbers)
+    expected = GovernedStream(p, demand[0]).advance(1e-9 * stamps, demand)
+    assert motion.rows.tobytes() == expected.rows.tobytes(), named
+    exceeded = exceedances(p, motion, axes)
+    assert {name for name, wrong in exceeded.items() if wrong.any()} == set(), named
+    assert (found['code'] == CODES['STEWART_OK']).all()
+    return found, motion
+
+
 @pytest.mark.parametrize('wanted', DEMANDS)
 def test_no_limit_is_exceeded_by_any_setpoint(program: Path, wanted: str) -> None:
     """Each kind of limit and of demand, 1100 setpoints each; they have the bits of Python's."""
@@ -111,14 +124,8 @@ def test_no_limit_is_exceeded_by_any_setpoint(program: Path, wanted: str) -> Non
             except ParameterError:  # home is not within such limits
                 continue
         stamps, demand = from_home(p, *random_demand(random, wanted, p, 1100))
-        numbers, demand = to_references(demand)
-        found, motion = governed(program, p, stamps, numbers)
-        expected = GovernedStream(p, demand[0]).advance(1e-9 * stamps, demand)
-        assert motion.rows.tobytes() == expected.rows.tobytes(), kind
-        exceeded = exceedances(p, motion, axes)
-        assert {name for name, wrong in exceeded.items() if wrong.any()} == set(), kind
+        found, motion = governed_within_limits(program, p, axes, stamps, demand, kind)
         # These are the commands: no position is clipped, no effort either.
-        assert (found['code'] == CODES['STEWART_OK']).all()
         platform = StewartPlatform(p)
         lengths = platform.inverse_kinematics(motion)
         assert np.array_equal(found['positions'], lengths - p['geometry.zero_length'])
@@ -141,13 +148,7 @@ def test_no_limit_of_cranks_is_exceeded_by_any_setpoint(program: Path, kind: str
             except ParameterError:  # home is not within such limits
                 continue
         stamps, demand = from_home(p, *random_demand(random, wanted, p, 200))
-        numbers, demand = to_references(demand)
-        found, motion = governed(program, p, stamps, numbers)
-        expected = GovernedStream(p, demand[0]).advance(1e-9 * stamps, demand)
-        assert motion.rows.tobytes() == expected.rows.tobytes(), wanted
-        exceeded = exceedances(p, motion, axes)
-        assert {name for name, wrong in exceeded.items() if wrong.any()} == set(), wanted
-        assert (found['code'] == CODES['STEWART_OK']).all()
+        found, motion = governed_within_limits(program, p, axes, stamps, demand, wanted)
         result = StewartPlatform(p).inverse_dynamics(motion)
         assert np.array_equal(found['positions'], result.angles)
         assert np.array_equal(found['efforts'], result.torques)

@@ -132,7 +132,7 @@ def document(found: Identified, options: IdentificationOptions) -> dict[str, Any
         'samples': found.samples, 'efforts_left_out': found.unsound,
         'efforts_outliers': found.outliers,
         'parameters': parameters,
-        # A single parameter is none of them: its interval is too wide by the lack of fit.
+        # Without single parameters: their intervals are too wide because of the lack of fit.
         'combinations': [each for each in combined(
             what, [u.names[n] for n in asked], [u.units[n] for n in asked],
             found.fit.values[asked], found.fit.covariance[np.ix_(asked, asked)], unclear,
