@@ -9,13 +9,16 @@ A file of others can make a loader repeat a body a billion times, read a device 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 import subprocess
 import sys
+from types import ModuleType
 
 from stewart_dynamics.errors import one_line
-from stewart_dynamics.legs.mechanism import DescriptionError
+from stewart_dynamics.legs.mechanism import DescriptionError, Mechanism
 
 _TIME = 30  # [s]
 _WAIT = 4 * _TIME
@@ -66,13 +69,34 @@ def load_in_process(package: str, imports: str, load: str, source: Path, target:
             f'{_MEMORY >> 30} GiB (exit code {ended.returncode})')
 
 
-def unusable(source: Path, use: str, package: str, extra: str, exc: Exception,
-             ) -> DescriptionError:
+def read_with(package: str, module: str, extra: str, source: Path, form: str,
+              read: Callable[[ModuleType, Path], Mechanism]) -> Mechanism:
+    """
+    Return what ``read`` makes of a file with a module of a package, which an extra brings.
+
+    form: the format of the file, in errors.
+    Raises DescriptionError: in one line: the package is missing, too old or broken.
+    """
+    try:
+        imported = import_module(module)
+    except ModuleNotFoundError as exc:
+        raise DescriptionError(f'{source}: {form} is read by {package}: pip install '
+                               f"'stewart_dynamics[{extra}]'") from exc
+    except Exception as exc:  # a package of parts of several versions fails in any way
+        raise _unusable(source, package, extra, form, exc) from exc
+    try:
+        return read(imported, source)
+    except (AttributeError, ImportError) as exc:
+        raise _unusable(source, package, extra, form, exc) from exc
+
+
+def _unusable(source: Path, package: str, extra: str, form: str, exc: Exception,
+              ) -> DescriptionError:
     """Return the error about a package that is too old, or broken."""
     try:
         installed = version(package)
     except PackageNotFoundError:
         installed = 'of an unknown version'
     return DescriptionError(
-        f'{source}: {use} by {package}: the installed package, {installed}, cannot be used '
-        f"({one_line(exc)}): pip install --force-reinstall 'stewart_dynamics[{extra}]'")
+        f'{source}: {form} is read by {package}: the installed package, {installed}, cannot be '
+        f"used ({one_line(exc)}): pip install --force-reinstall 'stewart_dynamics[{extra}]'")

@@ -18,8 +18,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.read_urdf import axis_of, end_of, origin_of
-from stewart_dynamics.legs.mechanism import Placement
+from stewart_dynamics.description.read_urdf import UrdfModel
+from stewart_dynamics.legs.mechanism import FIXED, HERE, HINGE, Placement
 from stewart_dynamics.mechanics.frames.rotation import (
     quaternion_of, quaternion_product, to_quaternion)
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
@@ -52,26 +52,24 @@ class ModelMessages:
             stamp, (*pose[POSITION], *quaternion_of(pose[ROTATION])))
 
 
-_SOURCE = Path('robot_description')  # of errors
-
-
 class LinkTransforms:
     """The transforms of the joints of a URDF that ``urdf`` has written."""
 
     def __init__(self, urdf: str) -> None:
-        joints = ET.fromstring(urdf).findall('joint')
-        fixed = [each for each in joints if each.get('type') == 'fixed']
-        moving = [each for each in joints if each.get('type') != 'fixed']
-        self.moving, self.fixed = [*map(_links, moving)], [*map(_links, fixed)]
+        model = UrdfModel(ET.fromstring(urdf), Path('robot_description'))
+        placed = [(model.pose(each), model.joint(each, HERE)) for each in model.joints]
+        moving, fixed = ([each for each in placed if (each[1].kind == FIXED) is is_fixed]
+                         for is_fixed in (False, True))
+        self.moving, self.fixed = ([(joint.parent, joint.child) for _, joint in some]
+                                   for some in (moving, fixed))
         """Parent and child of the K joints that move, and of the M joints that do not."""
-        self.at_fixed = _rows([origin_of(each, _SOURCE) for each in fixed])
+        self.at_fixed = _rows([place for place, _ in fixed])
         """Transforms of the latter (M, 7): x y z [m] and the quaternion's x y z w."""
-        places = [origin_of(each, _SOURCE) for each in moving]
-        self._origins = _rows(places)
-        self._revolute = np.array([each.get('type') == 'revolute' for each in moving])
-        axes = np.array([axis_of(each, _SOURCE) for each in moving])
+        self._origins = _rows([place for place, _ in moving])
+        self._revolute = np.array([joint.kind == HINGE for _, joint in moving])
+        axes = np.array([joint.axes[0] for _, joint in moving])
         self._directions = np.array([
-            place.rotation @ axis for place, axis in zip(places, axes, strict=True)])
+            place.rotation @ joint.axes[0] for place, joint in moving])
         # The quaternion after half a turn about the axis.
         self._turned = quaternion_product(
             self._origins[:, 3:], np.column_stack([axes, np.zeros(len(axes))]))
@@ -88,10 +86,6 @@ class LinkTransforms:
         for n in range(4):
             found[..., 3 + n] = self._origins[:, 3 + n] * cosines + self._turned[:, n] * sines
         return found
-
-
-def _links(joint: ET.Element) -> tuple[str, str]:
-    return end_of(joint, 'parent', _SOURCE), end_of(joint, 'child', _SOURCE)
 
 
 def _rows(places: list[Placement]) -> Array:

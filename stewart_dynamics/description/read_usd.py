@@ -13,12 +13,13 @@ from __future__ import annotations
 import math
 from pathlib import Path
 import tempfile
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.bounded_process import load_in_process, unusable
+from stewart_dynamics.description.bounded_process import load_in_process, read_with
 from stewart_dynamics.description.usd import (
     ANGULAR, armature, attribute_name, coulomb_friction, ELEMENT, LINEAR, POSITION, rate_limit,
     VALUE)
@@ -41,45 +42,40 @@ def read_usd(source: Path) -> Mechanism:
     """Return the mechanism of a USD; DescriptionError where usd-core rejects it."""
     if not source.is_file():
         raise DescriptionError(f'{source}: cannot be read: not a regular file')
-    try:
-        import pxr.Usd
-        import pxr.UsdPhysics  # noqa: F401
-    except ModuleNotFoundError as exc:
-        raise DescriptionError(
-            f"{source}: USD is read by usd-core: pip install 'stewart_dynamics[usd]'") from exc
-    except Exception as exc:  # a package of parts of several versions fails in any way
-        raise unusable(source, 'USD is read', 'usd-core', 'usd', exc) from exc
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            flat = Path(folder) / 'flat.usdc'
-            load_in_process('usd-core', 'from pxr import Usd',
-                            'Usd.Stage.Open(source).Flatten().Export(target)', source, flat)
-            return _Scene(pxr.Usd.Stage.Open(str(flat)), source).mechanism
-    except (AttributeError, ImportError) as exc:
-        raise unusable(source, 'USD is read', 'usd-core', 'usd', exc) from exc
+    return read_with('usd-core', 'pxr.UsdPhysics', 'usd', source, 'USD', _mechanism)
+
+
+def _mechanism(physics: ModuleType, source: Path) -> Mechanism:
+    from pxr import Usd
+
+    with tempfile.TemporaryDirectory() as folder:
+        flat = Path(folder) / 'flat.usdc'
+        load_in_process('usd-core', 'from pxr import Usd',
+                        'Usd.Stage.Open(source).Flatten().Export(target)', source, flat)
+        return _Scene(Usd.Stage.Open(str(flat)), physics, source).mechanism
 
 
 class _Scene:
     """Bodies and joints of a stage, in m and kg."""
 
-    def __init__(self, stage: Any, source: Path) -> None:
-        from pxr import Usd, UsdGeom, UsdPhysics
+    def __init__(self, stage: Any, physics: Any, source: Path) -> None:
+        from pxr import Usd, UsdGeom
 
-        self._geom, self._physics, self._source = UsdGeom, UsdPhysics, source
+        self._geom, self._physics, self._source = UsdGeom, physics, source
         self._length = float(UsdGeom.GetStageMetersPerUnit(stage))
-        self._mass = float(UsdPhysics.GetStageKilogramsPerUnit(stage))
+        self._mass = float(physics.GetStageKilogramsPerUnit(stage))
         self._cache = UsdGeom.XformCache(Usd.TimeCode.Default())
         self._names: dict[str, str] = {}  # of bodies, by their paths
         self.mechanism = Mechanism(str(source), source.stem, {}, [], resolution=_SINGLE)
         prims = [*Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())]
         for prim in prims:
-            if prim.HasAPI(UsdPhysics.RigidBodyAPI):
+            if prim.HasAPI(physics.RigidBodyAPI):
                 self._add_body(prim)
         for prim in prims:
-            if prim.IsA(UsdPhysics.Joint):
+            if prim.IsA(physics.Joint):
                 self._add_joint(prim)
         up = np.eye(3)[1 if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y else 2]
-        scenes = [prim for prim in prims if prim.IsA(UsdPhysics.Scene)]
+        scenes = [prim for prim in prims if prim.IsA(physics.Scene)]
         self.mechanism.gravity = self._gravity(scenes, up)
         if stage.GetDefaultPrim():
             self._add_carried(stage.GetDefaultPrim())

@@ -1,0 +1,234 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Frames, links and joints in XML, by the rules that URDF and SDFormat have in common.
+
+Each frame is relative to another. A value is an attribute in URDF and an element in SDFormat; the
+limits and dynamics of a joint are elements of the joint, or of its axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import math
+from pathlib import Path
+from typing import NamedTuple, TypeVar
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.legs.mechanism import (
+    BALL, CarriedParameter, DescriptionError, FIXED, HERE, HINGE, Joint, MechanismBody, OTHER,
+    Placement, SLIDE, UNIVERSAL)
+from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.parameters.table import INERTIA, inertia_matrix
+
+_KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
+          'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': BALL, 'spherical': BALL}
+_LIMITS = {'lower': 'lower', 'upper': 'upper', 'velocity': 'velocity_max', 'effort': 'force_max'}
+_UNLIMITED = 1e15  # SDFormat's own value is 1e16
+DRAKE = '{http://drake.mit.edu}'
+_Default = TypeVar('_Default', bound=float | None)
+
+
+class Defaults(NamedTuple):
+    """Values of missing elements."""
+
+    axis: str  # of a joint, in its frame
+    mass: float | None  # of a link [kg]
+    moment: float  # of a link about each axis [kg m^2]
+    least: float  # smaller limits of rates and forces are unlimited
+
+
+class XmlModel:
+    """
+    The frames of a model.
+
+    source: in errors. links: names that joints may have. defaults: those of the format.
+    placements: frames that are relative to no other, by their names.
+    """
+
+    def __init__(self, source: Path, links: Iterable[str], defaults: Defaults,
+                 placements: dict[str, Placement]) -> None:
+        self.source, self._links, self._defaults = source, {*links}, defaults
+        self._placements = placements
+        self._frames: dict[str, tuple[str, Placement]] = {}
+
+    def error(self, why: str) -> DescriptionError:
+        """Return the error about the file."""
+        return DescriptionError(f'{self.source}: {why}')
+
+    def add_frame(self, name: str, relative_to: str, pose: Placement) -> None:
+        """Add a frame that has a pose in another, which may be added later."""
+        self._frames[name] = relative_to, pose
+
+    def place(self, name: str) -> Placement:
+        """Return where a frame is."""
+        waiting: dict[str, None] = {}  # frames, each relative to the next
+        while name not in self._placements:
+            if name not in self._frames:
+                raise self.error(f'no frame {name!r}')
+            if name in waiting:
+                raise self.error(f'frame {name!r} is relative to itself')
+            waiting[name] = None
+            name = self._frames[name][0]
+        at = self._placements[name]
+        for name in reversed(waiting):
+            at = self._placements[name] = at.of(self._frames[name][1])
+        return at
+
+    def numbers(self, text: str | None, count: int, what: str) -> Array:
+        """Parse ``count`` finite numbers; return zeros if the text is missing."""
+        if text is None:
+            return np.zeros(count)
+        try:
+            values = np.array([float(each) for each in text.split()])
+        except ValueError as exc:
+            raise self.error(f'{what}: {text!r}: must be numbers') from exc
+        if len(values) != count or not np.isfinite(values).all():
+            raise self.error(f'{what}: {text!r}: must be {count} finite numbers')
+        return values
+
+    def number(self, element: ET.Element, name: str, default: _Default, *path: str,
+               ) -> float | _Default:
+        """Return the number at a path below an element; ``name`` is that of its link or joint."""
+        text = _text(element, *path)
+        return default if text is None else float(
+            self.numbers(text, 1, f'{name}: {"/".join(path)}')[0])
+
+    def unit(self, text: str | None, what: str) -> Array:
+        """Parse an axis (3,), as a vector of length 1."""
+        axis = self.numbers(text, 3, what)
+        length = float(np.linalg.norm(axis))
+        if length == 0.0:
+            raise self.error(f'{what}: the axis is zero')
+        return axis / length
+
+    def pose(self, element: ET.Element, origin: str = 'origin') -> Placement:
+        """Return the pose in an element: the attributes of its origin, or the text of its pose."""
+        given = element.find(origin)
+        what = f'{element.tag} {element.get("name", "")!r}'
+        if given is not None:
+            xyz, rpy = (self.numbers(given.get(key), 3, f'{origin} of {what}')
+                        for key in ('xyz', 'rpy'))
+            return Placement(from_euler(rpy), xyz)
+        given = element.find('pose')
+        if given is None or not (given.text or '').strip():
+            return HERE
+        values = self.numbers(given.text, 6, f'pose of {what}')
+        angles = np.pi / 180.0 if given.get('degrees') in ('1', 'true') else 1.0
+        return Placement(from_euler(angles * values[3:]), values[:3])
+
+    def link(self, name: str, what: str) -> str:
+        """Return the name of a link; ``what`` names it in the error that there is none."""
+        if name not in self._links:
+            raise self.error(f'{what}: no link {name!r}')
+        return name
+
+    def end(self, joint: ET.Element, side: str) -> str:
+        """Return the link at a side of a joint, parent or child."""
+        end, what = joint.find(side), f'{joint.tag} {joint.get("name", "")!r}'
+        name = None if end is None else end.get('link') or (end.text or '').strip()
+        if not name:
+            raise self.error(f'{what}: no {side}')
+        return self.link(name, what)
+
+    def body(self, link: ET.Element) -> MechanismBody:
+        """Return a link as a body."""
+        name, inertial = link.get('name', ''), link.find('inertial')
+        mass, moment = self._defaults.mass, self._defaults.moment
+        made = MechanismBody(name, self.place(name), mass, inertia=moment * np.eye(3),
+                             shapes=len(link.findall('visual')) + len(link.findall('collision')))
+        if inertial is not None:
+            own, made.mass = self.pose(inertial), self.number(inertial, name, mass, 'mass')
+            tensor = inertia_matrix(np.array([self.number(
+                inertial, name, moment if key[1] == key[2] else 0.0, 'inertia', key)
+                for key in INERTIA]))
+            turned = not np.array_equal(own.rotation, np.eye(3))
+            made.center = own.position
+            made.inertia = own.rotation @ tensor @ own.rotation.T if turned else tensor
+        elif mass is not None:
+            made.note = f'{name}: no mass: {mass:g} kg, as SDFormat has it'
+        return made
+
+    def joint(self, joint: ET.Element, at: Placement, position: float = 0.0,
+              defaults: Defaults | None = None) -> Joint:
+        """
+        Return a joint.
+
+        at: where its frame is. position: of the joint there; its limits are counted from it.
+        defaults: those of its elements, where they are not those of the model.
+        """
+        defaults = defaults or self._defaults
+        name, kind = joint.get('name', ''), kind_of(joint)
+        made = Joint(name, kind, self.end(joint, 'parent'), self.end(joint, 'child'), at.position,
+                     position=position)
+        axes = [each for each in (joint.find('axis'), joint.find('axis2')) if each is not None]
+        if kind in (HINGE, SLIDE, UNIVERSAL):
+            made.axes = [self.axis_frame(axis, at).rotation @ self.unit(
+                _text(axis, 'xyz') or defaults.axis, f'axis of joint {name!r}')
+                for axis in axes or [joint] * (kind != UNIVERSAL)]
+        for holder in (joint, *axes):
+            self._add_dynamics(holder, made)
+            self._add_limits(holder, made, defaults.least)
+        return made
+
+    def axis_frame(self, axis: ET.Element, at: Placement) -> Placement:
+        """Return the frame of an axis of a joint; ``at`` is the frame of the joint."""
+        return at
+
+    def _add_dynamics(self, holder: ET.Element, made: Joint) -> None:
+        """Add forces on a joint; one with two axes has the larger friction."""
+        damping, friction, stiffness, reference = (
+            self.number(holder, made.name, 0.0, 'dynamics', key)
+            for key in ('damping', 'friction', 'spring_stiffness', 'spring_reference'))
+        made.damping = max(made.damping, damping, key=abs)
+        made.friction = max(made.friction, friction, key=abs)
+        if stiffness:
+            made.spring(stiffness, reference)
+
+    def _add_limits(self, holder: ET.Element, made: Joint, least: float) -> None:
+        for key, field in _LIMITS.items() if made.kind in (HINGE, SLIDE) else ():
+            value = self.number(holder, made.name, math.inf, 'limit', key)
+            bounds_rate_or_force = field.endswith('_max')
+            if abs(value) < _UNLIMITED and not (bounds_rate_or_force and value < least):
+                setattr(made, field, value + (0.0 if bounds_rate_or_force else made.position))
+        limit, mimic = holder.find('limit'), holder.find('mimic')
+        if limit is not None:
+            made.left_out += [f'{key} {value} of its limit' for key, value in limit.attrib.items()
+                              if key not in _LIMITS]
+        if holder.find('safety_controller') is not None:
+            made.left_out.append('safety_controller')
+        if mimic is not None:
+            made.left_out.append(f'mimic of {mimic.get("joint", "")!r}')
+
+    def loop(self, name: str, first: tuple[str, Array], second: tuple[str, Array],
+             kind: str = BALL) -> Joint:
+        """Return the joint that closes a loop between points of two links."""
+        (parent, at_parent), (child, at_child) = first, second
+        return Joint(name, kind, parent, child, self.place(parent).point(at_parent),
+                     child_anchor=self.place(child).point(at_child))
+
+
+def kind_of(joint: ET.Element) -> str:
+    """Return the kind of a joint."""
+    return _KINDS.get(joint.get('type', ''), OTHER)
+
+
+def carried_of(elements: Iterable[ET.Element]) -> dict[str, CarriedParameter]:
+    """Return the parameters that stewart_describe has added."""
+    return {each.get('name', ''): CarriedParameter(each.get('value', ''), each.get('element', ''))
+            for each in elements}
+
+
+def _text(element: ET.Element, *path: str) -> str | None:
+    """Return an attribute, or the text of an element; None where it is missing or empty."""
+    holder = element.find('/'.join(path[:-1])) if path[1:] else element
+    if holder is None or path[-1] in holder.attrib:
+        return None if holder is None else holder.get(path[-1])
+    child = holder.find(path[-1])
+    if child is None:
+        return None
+    return child.get('value', (child.text or '').strip() or None)
