@@ -16,8 +16,8 @@ from referees import (
 from snapshot import Snapshot
 
 from stewart_dynamics import Capability, Motion, Parameters, Pose, StewartPlatform
+from stewart_dynamics.description.formats import read_hexapod
 from stewart_dynamics.description.hexapod import Hexapod
-from stewart_dynamics.description.recognition import read_hexapod
 from stewart_dynamics.description.sdf import sdf
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.errors import ParameterError

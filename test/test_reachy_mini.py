@@ -21,7 +21,7 @@ import pytest
 from referees import Array, random_direction, rng, ROOT, rotation_about
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.description import main as describe
-from stewart_dynamics.description.recognition import read_hexapod
+from stewart_dynamics.description.formats import read_hexapod
 
 pin = pytest.importorskip('pinocchio')
 pytestmark = pytest.mark.skipif('STEWART_REACHY_MINI' not in os.environ,

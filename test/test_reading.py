@@ -21,10 +21,10 @@ import pytest
 from referees import random_parameters, rng, ROOT
 from stewart_dynamics import Motion, Parameters, StewartError, StewartPlatform
 from stewart_dynamics.description import bounded_process as loading
+from stewart_dynamics.description.formats import read_hexapod
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.loops import loops_name, loops_yaml
 from stewart_dynamics.description.mjcf import mjcf
-from stewart_dynamics.description.recognition import read_hexapod
 from stewart_dynamics.description.sdf import sdf, upright
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.description.usd import usd

@@ -15,9 +15,10 @@ from referees import ROOT, rotation_about
 from snapshot import Snapshot
 from stewart_dynamics import Parameters, StewartError, StewartPlatform
 from stewart_dynamics.description import main
+from stewart_dynamics.description.formats import read_hexapod
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.mjcf import mjcf
-from stewart_dynamics.description.recognition import read_hexapod, Recognized
+from stewart_dynamics.description.recognition import Recognized
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.frames.rotation import to_euler, to_quaternion
 from test_reading import foreign

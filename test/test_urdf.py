@@ -21,9 +21,9 @@ from referees import (
 from snapshot import Snapshot
 
 from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
+from stewart_dynamics.description.formats import read_hexapod
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.loops import loops_yaml
-from stewart_dynamics.description.recognition import read_hexapod
 from stewart_dynamics.description.urdf import Ros2Control, urdf
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 import yaml

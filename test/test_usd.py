@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 import pytest
 from referees import random_parameters, rng
 from stewart_dynamics import Parameters, StewartError, StewartPlatform
+from stewart_dynamics.description.formats import read_hexapod
 from stewart_dynamics.description.hexapod import Hexapod
-from stewart_dynamics.description.recognition import read_hexapod
 from stewart_dynamics.description.usd import usd
 
 pytest.importorskip('pxr', reason='needs usd-core')

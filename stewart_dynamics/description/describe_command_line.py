@@ -122,7 +122,7 @@ def _write(given: argparse.Namespace, files: FilesOfFolder) -> int:
 def _read(given: argparse.Namespace, files: FilesOfFolder) -> int:
     from stewart_dynamics.description.hexapod import Hexapod
     from stewart_dynamics.description.picture import picture
-    from stewart_dynamics.description.recognition import read_hexapod
+    from stewart_dynamics.description.formats import read_hexapod
 
     interrupt_on_signals()
     for option in ('ros2_control', 'usd', 'solid', 'constraints'):

@@ -11,7 +11,6 @@ limits and dynamics of a joint are elements of the joint, or of its axes.
 from __future__ import annotations
 
 from collections.abc import Iterable
-import math
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 from xml.etree import ElementTree as ET
@@ -28,7 +27,8 @@ from stewart_dynamics.parameters.table import INERTIA, inertia_matrix
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': BALL, 'spherical': BALL}
 _LIMITS = {'lower': 'lower', 'upper': 'upper', 'velocity': 'velocity_max', 'effort': 'force_max'}
-_UNLIMITED = 1e15  # SDFormat's own value is 1e16
+# Limits that are none; SDFormat's default is 1e16 or, from version 1.10 on, inf.
+_UNLIMITED, _INFINITE = 1e15, ('inf', '+inf', '-inf')
 DRAKE = '{http://drake.mit.edu}'
 _Default = TypeVar('_Default', bound=float | None)
 
@@ -191,10 +191,13 @@ class XmlModel:
 
     def _add_limits(self, holder: ET.Element, made: Joint, least: float) -> None:
         for key, field in _LIMITS.items() if made.kind in (HINGE, SLIDE) else ():
-            value = self.number(holder, made.name, math.inf, 'limit', key)
-            bounds_rate_or_force = field.endswith('_max')
-            if abs(value) < _UNLIMITED and not (bounds_rate_or_force and value < least):
-                setattr(made, field, value + (0.0 if bounds_rate_or_force else made.position))
+            text = _text(holder, 'limit', key)
+            if text is None or text.strip().lower() in _INFINITE:
+                continue
+            value = float(self.numbers(text, 1, f'{made.name}: limit/{key}')[0])
+            of_position = not field.endswith('_max')
+            if abs(value) < _UNLIMITED and (of_position or value >= least):
+                setattr(made, field, value + (made.position if of_position else 0.0))
         limit, mimic = holder.find('limit'), holder.find('mimic')
         if limit is not None:
             made.left_out += [f'{key} {value} of its limit' for key, value in limit.attrib.items()
