@@ -225,6 +225,16 @@ def test_a_limit_that_is_added_to_a_file_without_it_is_read(
     check_all_else_stays(p, found, name)
 
 
+@pytest.mark.parametrize(('kind', 'pattern'), [
+    ('sdf', r'(<(?:lower|upper|effort|velocity)>)[^<]*'),
+    ('urdf', r'((?:lower|upper|effort|velocity)=")[^"]*')])
+def test_limits_that_are_inf_are_unlimited(kind, pattern, tmp_path):
+    """SDFormat has this default since version 1.10, and libsdformat writes it."""
+    found = read_hexapod(written(PLATFORM, kind, tmp_path, lambda text: re.sub(
+        pattern, r'\1inf', text))).parameters
+    assert all(found[name] is None for name in PLATFORM.leg_kind.drive_limits)
+
+
 @pytest.mark.parametrize('kind', WRITERS)
 def test_an_edited_gravity_or_tilt_and_an_edited_name_are_read(kind, tmp_path):
     p = PLATFORM.replaced({'gravity': [0.0, 0.0, -1.62]})

@@ -90,8 +90,9 @@ class _Model:
         for n in range(model.ntendon):
             self._name_tendon(n)
         self._take_actuators()
-        texts = {model.text(n).name: bytes(model.text_data[at:at + size]).rstrip(b'\0').decode()
-                 for n, (at, size) in enumerate(zip(model.text_adr, model.text_size, strict=True))}
+        texts = {mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TEXT, n) or '': bytes(
+            model.text_data[at:at + size]).rstrip(b'\0').decode()
+            for n, (at, size) in enumerate(zip(model.text_adr, model.text_size, strict=True))}
         self.mechanism.carried = {
             name: CarriedParameter(texts[f'{CARRIED}.{name}'], texts.get(f'{ELEMENT}.{name}', ''))
             for name in PARAMETERS if f'{CARRIED}.{name}' in texts}
