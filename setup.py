@@ -247,6 +247,7 @@ setup(
             'stewart_dynamics = stewart_dynamics.ros.console_scripts:dynamics',
             'stewart_export = stewart_dynamics.export:main',
             'stewart_identify = stewart_dynamics.identification:main',
+            'stewart_init = stewart_dynamics.questions:main',
             'stewart_replay = stewart_dynamics.replay:main',
             'stewart_simulator = stewart_dynamics.ros.console_scripts:simulator',
             'stewart_trajectory = stewart_dynamics.ros.console_scripts:trajectory',

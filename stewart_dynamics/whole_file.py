@@ -94,6 +94,11 @@ class FilesOfFolder:
                 raise StewartError(f'{path}: another run has written it meanwhile: it is not '
                                    'replaced')
 
+    def existing(self, names: Iterable[str], beside: Mapping[str, str]) -> list[str]:
+        """Return the files that exist, of ``beside`` those with another content."""
+        return [name for name in (*names, *beside) if name in self._before
+                and not (name in beside and self._has(name, beside[name].encode()))]
+
     def write(self, files: Mapping[str, str | bytes], beside: Mapping[str, str] | None = None,
               ) -> list[Path]:
         """

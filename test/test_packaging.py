@@ -27,8 +27,8 @@ ROOT = Path(__file__).resolve().parents[1]
 NAME = 'stewart_dynamics'
 EXECUTABLES = ('stewart_calibrate', 'stewart_capability', 'stewart_cueing',
                'stewart_cueing_report', 'stewart_dynamics', 'stewart_describe',
-               'stewart_export', 'stewart_identify', 'stewart_replay', 'stewart_simulator',
-               'stewart_trajectory')
+               'stewart_export', 'stewart_identify', 'stewart_init', 'stewart_replay',
+               'stewart_simulator', 'stewart_trajectory')
 PACKAGED = ('bags', 'config', 'examples', 'launch', 'resource', 'security', NAME, 'LICENSE',
             'CHANGELOG.rst', 'CONTRIBUTING.md', 'MANIFEST.in', 'README.md', 'package.xml',
             'pyproject.toml', 'setup.cfg', 'setup.py')
@@ -263,7 +263,7 @@ def test_no_two_modules_have_the_same_name() -> None:
 def test_entry_point_loads(distribution: importlib.metadata.Distribution, name: str) -> None:
     """The function behind each executable exists."""
     if name not in ('stewart_calibrate', 'stewart_capability', 'stewart_describe',
-                    'stewart_export', 'stewart_replay'):
+                    'stewart_export', 'stewart_init', 'stewart_replay'):
         pytest.importorskip('rclpy')
     point, = distribution.entry_points.select(name=name)
     assert callable(point.load())

@@ -25,10 +25,10 @@ from stewart_dynamics.legs import CRANK, KINDS
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.circles import circle_names
-from stewart_dynamics.parameters.json_schema import json_schema
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS
 from stewart_dynamics.parameters.table import BY_IMU, FIXED, Parameters
+from stewart_dynamics.questions.editor_schema import SCHEMA, schema_text
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.consistency import (
     DELAY, DELAY_IN_SAMPLES, PERIOD, PERSISTENT, SHARE, SLOWEST, TICK, TOLERANCE, WEAKEST)
@@ -38,7 +38,7 @@ import yaml
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-SCHEMA = ROOT / 'config' / 'parameters.schema.json'
+SCHEMA_FILE = ROOT / 'config' / SCHEMA
 CONTROLLER_PARAMETERS = (ROOT / 'ros2_control' / 'stewart_dynamics_controller' / 'src'
                          / 'stewart_dynamics_controller_parameters.yaml')
 HEAD = '| name | type | unit | default | meaning |\n| --- | --- | --- | --- | --- |\n'
@@ -312,13 +312,6 @@ def accuracy_and_speed() -> str:
         '| `make bench-replay` |'))
 
 
-def schema() -> str:
-    """Return the JSON schema of parameter files, of all nodes."""
-    return json.dumps(json_schema((
-        Parameters, ReferenceMotionParameters, SimulatorParameters, CueingParameters)),
-        indent=1) + '\n'
-
-
 def pages() -> dict[Path, dict[str, str]]:
     """Return of each page with generated tables their names and texts."""
     figures, on_a_ship, known = (json.loads((HERE / f'{name}.json').read_text(encoding='utf-8'))
@@ -371,8 +364,8 @@ def main() -> None:
         page.write_text(generated(page.read_text(encoding='utf-8'), tables), encoding='utf-8')
         print(f'{page.relative_to(ROOT)}: {", ".join(tables)}')
     CONTROLLER_PARAMETERS.write_text(controller_parameters(), encoding='utf-8')
-    SCHEMA.write_text(schema(), encoding='utf-8')
-    for path in (CONTROLLER_PARAMETERS, SCHEMA):
+    SCHEMA_FILE.write_text(schema_text(), encoding='utf-8')
+    for path in (CONTROLLER_PARAMETERS, SCHEMA_FILE):
         print(path.relative_to(ROOT))
 
 

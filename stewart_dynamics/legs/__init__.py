@@ -29,9 +29,9 @@ def example_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _EXAMPLES.glob('*.yaml')))
 
 
-def example(name: str) -> str:
+def example_file(name: str) -> Path:
     """
-    Return a commented parameter file to begin with.
+    Return the path of a commented parameter file to begin with.
 
     Raises ParameterError: the name is not in ``example_names``.
     """
@@ -39,7 +39,12 @@ def example(name: str) -> str:
         given = shown_name(name) if name else 'missing'
         raise ParameterError(
             f'--example: {given}: must be one of {", ".join(example_names())}')
-    return (_EXAMPLES / f'{name}.yaml').read_text(encoding='utf-8')
+    return _EXAMPLES / f'{name}.yaml'
+
+
+def example(name: str) -> str:
+    """Return the text of ``example_file``."""
+    return example_file(name).read_text(encoding='utf-8')
 
 
 def kind_of(values: Mapping[str, Any]) -> LegKind:

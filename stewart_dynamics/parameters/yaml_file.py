@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import takewhile
 from pathlib import Path
 import re
+from textwrap import wrap
 from typing import Any
 
 from stewart_dynamics.errors import one_line, ParameterError, shown, shown_name
@@ -52,6 +53,7 @@ OF_ROS_PREFIX = 'qos_overrides.'
 _NAME = re.compile('[A-Za-z_][A-Za-z0-9_]*')
 _LONGEST_ROW = 6
 _ROW = 3  # numbers in each row of a longer list: x y z
+_COLUMNS = 99  # a comment that would make a line longer stands above it
 _LISTED = 9
 
 
@@ -298,8 +300,8 @@ def write_yaml(path: str | Path, values: Mapping[str, Any], comments: Mapping[st
     Write a ROS parameter file for any node, complete or not at all; replaces an existing one.
 
     Values are texts, doubles, bools, or tuples of them, by dotted names; a tuple of length 1 is
-    written as a single value. Comments stand behind the values, ``head`` before all lines. Raises
-    ParameterError if the file cannot be written.
+    written as a single value. Comments stand behind the values, long ones above them, ``head``
+    before all lines. Raises ParameterError if the file cannot be written.
     """
     try:
         write_files({Path(path): yaml_text(values, comments, head).encode('utf-8')})
@@ -330,16 +332,23 @@ def _lines(tree: Mapping[str, Any], indent: str) -> Iterator[str]:
             continue
         value, text = content
         entries = [_written(each) for each in (value if isinstance(value, tuple) else (value,))]
-        comment = f'  # {text}' if text else ''
+        rest: list[str] = []
         if len(entries) == 1:
-            yield f'{indent}{name}: {entries[0]}{comment}'
+            first = f'{indent}{name}: {entries[0]}'
         elif len(entries) <= _LONGEST_ROW:
-            yield f'{indent}{name}: [{", ".join(entries)}]{comment}'
+            first = f'{indent}{name}: [{", ".join(entries)}]'
         else:
-            yield f'{indent}{name}: [{comment}'
+            first = f'{indent}{name}: ['
             for n in range(0, len(entries), _ROW):
                 end = ']' if n + _ROW >= len(entries) else ','
-                yield f'{indent}  {", ".join(entries[n:n + _ROW])}{end}'
+                rest.append(f'{indent}  {", ".join(entries[n:n + _ROW])}{end}')
+        if text and len(commented := f'{first}  # {text}') <= _COLUMNS:
+            first = commented
+        elif text:
+            yield from wrap(text, _COLUMNS, initial_indent=f'{indent}# ',
+                            subsequent_indent=f'{indent}# ', break_on_hyphens=False)
+        yield first
+        yield from rest
 
 
 def _written(value: Any) -> str:
