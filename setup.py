@@ -45,6 +45,7 @@ install_requires = [
 extras_require = {
     'calibrate': ['scipy>=1.10'],
     'cluster': ['distributed>=2024.1'],
+    'completion': ['argcomplete>=3.1'],
     'differentiate': ['scipy>=1.10'],
     'docs': [
         'docutils>=0.21',  # tex2mathml has as_block

@@ -127,7 +127,12 @@ class Program:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose help and version are written, or an error."""
+    """A parser whose help and version are written, or an error; shells complete by it."""
+
+    def parse_args(self, *arguments: Any) -> Any:  # type: ignore[override]
+        """Parse arguments, or answer a shell."""
+        complete(self)
+        return super().parse_args(*arguments)
 
     def _print_message(self, message: str, file: Any = None) -> None:
         """Print a message; exit if the standard output cannot be written."""
@@ -135,6 +140,15 @@ class _Parser(argparse.ArgumentParser):
         if fault and file is not sys.stderr:
             written(f'{self.prog}: {unwritten(fault)}', sys.stderr)
             sys.exit(BAD_INPUT)
+
+
+def complete(parser: argparse.ArgumentParser) -> None:
+    """Answer a shell that completes a command line, and exit; return if none has called."""
+    if '_ARGCOMPLETE' in os.environ:
+        with suppress(ImportError):  # an extra
+            import argcomplete
+
+            argcomplete.autocomplete(parser)
 
 
 def unwritten(fault: str) -> str:

@@ -50,7 +50,7 @@ KEYS = {
 # Engines and readers of descriptions: tests that need them are skipped without them.
 ENGINES = {'pydrake', 'pytransform3d', 'urchin', 'yourdfpy'}
 # Modules that are imported where an option asks for them, and the extra that brings them.
-OPTIONAL = {'cupy': 'gpu', 'dask': 'cluster', 'distributed': 'cluster', 'matplotlib': 'plot',
+OPTIONAL = {'argcomplete': 'completion', 'cupy': 'gpu', 'dask': 'cluster', 'distributed': 'cluster', 'matplotlib': 'plot',
             'mujoco': 'mujoco', 'pandas': 'pandas', 'pxr': 'usd', 'pyarrow': 'parquet',
             'scipy': 'differentiate'}
 # Modules whose name on PyPI is not their own.

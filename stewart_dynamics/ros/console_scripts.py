@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from importlib import import_module
+import os
 import sys
 from typing import Any, NoReturn, TYPE_CHECKING
 
@@ -121,6 +122,24 @@ def usage(kind: type[ParameterSet]) -> str:
           if kind.unused else [])])
 
 
+def _complete(kind: type[ParameterSet]) -> None:
+    """Answer a shell that completes the arguments of a node, which ROS parses, and exit."""
+    import argparse
+
+    from stewart_dynamics.program import complete
+
+    parser = argparse.ArgumentParser(prog=kind.node)
+    for flag in ('--version', '--ros-args'):
+        parser.add_argument(flag, action='store_true')
+    if kind.node == _WITH_EXAMPLES:
+        parser.add_argument(_EXAMPLE, choices=_example_names())
+    for option in ('--params-file', '-r'):
+        parser.add_argument(option, action='append')
+    values: Any = parser.add_argument('-p', action='append')
+    values.completer = lambda **_: [f'{name}:=' for name in kind.table if name not in kind.unused]
+    complete(parser)
+
+
 def _example_names() -> tuple[str, ...]:
     from stewart_dynamics.legs import example_names
 
@@ -145,6 +164,8 @@ def _run(module: str, name: str, node: str) -> int:
     from stewart_dynamics.program import unwritten, written
 
     kind: type[ParameterSet] = getattr(_imported(module), name)
+    if '_ARGCOMPLETE' in os.environ:
+        _complete(kind)
     try:
         text = printed_request(sys.argv[1:], kind)
         if text is not None:
