@@ -17,6 +17,7 @@ import os
 from pathlib import Path
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 from typing import Any, NamedTuple, TYPE_CHECKING
@@ -292,6 +293,37 @@ def demonstration(command: str) -> Iterator[None]:
         raise SystemExit(130) from None
     finally:
         rclpy.try_shutdown()
+
+
+@contextmanager
+def live_view() -> Iterator[None]:
+    """Run examples/live_view.py, print its address, and open it where there is a browser."""
+    # Of its errors the address is not one: without the view, the demo goes on.
+    view = subprocess.Popen([sys.executable, ROOT / 'examples' / 'live_view.py', '--port', '0'],
+                            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+    try:
+        assert view.stdout is not None
+        if address := view.stdout.readline().strip():
+            print(f'the hexapod in motion: {address} (as long as the demo runs)', flush=True)
+            open_browser(address)
+        yield
+    finally:
+        view.terminate()
+        view.communicate()
+
+
+def open_browser(address: str) -> None:
+    """
+    Open a page in the browser of a user who has a screen, without waiting for it.
+
+    Nothing is opened where the output is not a terminal. In a session of its own, so that neither
+    Ctrl-C ends a browser nor one without windows takes the terminal.
+    """
+    if sys.stdout.isatty() and (sys.platform == 'darwin' or os.environ.get('DISPLAY')
+                                or os.environ.get('WAYLAND_DISPLAY')):
+        subprocess.Popen([sys.executable, '-m', 'webbrowser', address], start_new_session=True,
+                         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                         stderr=subprocess.DEVNULL)
 
 
 class Progress:

@@ -38,6 +38,10 @@ from stewart_dynamics.replay.summary_text import summary_lines
 from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parent.parent
+BAG, PARAMETERS = ROOT / 'bags' / 'singular', ROOT / 'config' / 'platform.yaml'
+EXPLANATION = """\
+This motion crosses a singularity, where forces grow without bound: 2.5 MN on legs of 6 kN below.
+The node warns 0.9 s before the crossing, and clips the forces that it publishes."""
 NODE = '/stewart_dynamics'
 LEG_STATES = f'{NODE}/leg_states'
 TYPES = {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped}
@@ -127,8 +131,8 @@ def _forces(states: Iterable[Any]) -> dict[tuple[int, int], list[float]]:
 def main() -> None:
     """Run the node, play the bag, print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument('--bag', type=Path, default=ROOT / 'bags' / 'singular')
-    parser.add_argument('--params', type=Path, default=ROOT / 'config' / 'platform.yaml')
+    parser.add_argument('--bag', type=Path, default=BAG)
+    parser.add_argument('--params', type=Path, default=PARAMETERS)
     options = parser.parse_args()
     # Isolated from other ROS programs on this computer and its network.
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
@@ -145,6 +149,8 @@ def main() -> None:
             demo = Demo(options.bag)
             executor = SingleThreadedExecutor()
             executor.add_node(demo)
+            if (options.bag, options.params) == (BAG, PARAMETERS):
+                print(EXPLANATION)
             print(f'starting {NODE} with {options.params.name}', flush=True)
             _wait(executor, 'the node is not active', 60.0, demo.connected, process)
             play(demo, executor, process)

@@ -22,8 +22,8 @@ import time
 from typing import Any, NamedTuple
 
 from closed_loop import (
-    BANDWIDTH, demonstration, Errors, Failure, leg_mass, PLOTS, Progress, Recorder, ROOT,
-    save, simulate, units)
+    BANDWIDTH, demonstration, Errors, Failure, leg_mass, live_view, PLOTS, Progress, Recorder,
+    ROOT, save, simulate, units)
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
@@ -199,12 +199,13 @@ def forward_name(kind: LegKind) -> str:
     return f'PD + {kind.effort.field}'
 
 
-def last_line(runs: Sequence[Run], kind: LegKind) -> str:
-    """Return the errors of the legs without and with feed-forward, as in the parameters."""
-    alone, forward = (run.errors.rms['all legs'] for run in runs[:2])
-    unit = units(kind)['all legs']
-    return (f'RMS error of the leg {kind.position.field}: {alone:.1f} {unit} by PD alone, '
-            f'{forward:.1f} {unit} with the {kind.effort.field} of the node')
+def conclusion(runs: Sequence[Run], kind: LegKind) -> str:
+    """Return in a sentence by how much the platform departs from its motion in each run."""
+    alone, forward, heavier_alone, heavier = (
+        f'{run.errors.peak["position"] / 1e3:.2g} mm' for run in runs)
+    return (f'With the {kind.effort.field} of the node the platform stays within {forward} of its '
+            f'motion, without them within {alone};\nwith a {payload_name(runs[-1].payload)} that '
+            f'the node does not know within {heavier}, without within {heavier_alone}.')
 
 
 def _peak(value: float) -> str:
@@ -265,7 +266,7 @@ def main() -> None:
               f'{kind.inertia_unit} that it moves alone: {loop.gains["proportional_gain"]:.3g} '
               f'{unit}, {loop.gains["derivative_gain"]:.3g} {kind.friction_units[0]}', flush=True)
         begun = time.monotonic()
-        with Progress(4 * options.seconds) as progress:
+        with live_view(), Progress(4 * options.seconds) as progress:
             for payload in (1.0, HEAVIER):
                 for feed_forward in (False, True):
                     name = forward_name(kind) if feed_forward else 'PD only'
@@ -275,7 +276,7 @@ def main() -> None:
         draw(options.output / 'loop.png', runs, kind)
         write_json(options.output / 'loop.json', summary(loop, runs))
         print(f'{time.monotonic() - begun:.0f} s; {options.output}: loop.png, loop.json')
-        print(last_line(runs, kind))
+        print(conclusion(runs, kind))
 
 
 if __name__ == '__main__':

@@ -95,6 +95,12 @@ def test_the_demo_prints_what_the_node_has_answered(domain: int, tmp_path: Path)
     assert log_lines(program.stderr, 'ERROR')  # of the force limits and of the crossing
     (answered, equal), = re.findall(
         r'^the node has answered (\d+) of 1001 setpoints, (\d+) of them', table, re.MULTILINE)
+    # Explained before it is seen, with the figures of the table.
+    first, second = table.splitlines()[:2]
+    assert first.startswith('This motion crosses a singularity, ')
+    assert '2.5 MN on legs of 6 kN' in first
+    assert '0.9 s before' in second
+    assert '0.92 s before the crossing' in table
     assert int(answered) > 900  # the first may come before the node listens
     assert equal == answered
     assert [line.split()[0] for line in table.splitlines() if line.startswith('leg_')] == [

@@ -50,9 +50,9 @@ KEYS = {
 # Engines and readers of descriptions: tests that need them are skipped without them.
 ENGINES = {'pydrake', 'pytransform3d', 'urchin', 'yourdfpy'}
 # Modules that are imported where an option asks for them, and the extra that brings them.
-OPTIONAL = {'argcomplete': 'completion', 'cupy': 'gpu', 'dask': 'cluster', 'distributed': 'cluster', 'matplotlib': 'plot',
-            'mujoco': 'mujoco', 'pandas': 'pandas', 'pxr': 'usd', 'pyarrow': 'parquet',
-            'scipy': 'differentiate'}
+OPTIONAL = {'argcomplete': 'completion', 'cupy': 'gpu', 'dask': 'cluster',
+            'distributed': 'cluster', 'matplotlib': 'plot', 'mujoco': 'mujoco',
+            'pandas': 'pandas', 'pxr': 'usd', 'pyarrow': 'parquet', 'scipy': 'differentiate'}
 # Modules whose name on PyPI is not their own.
 PIP_NAMES = {'cupy': 'cupy-cuda12x', 'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin',
              'pxr': 'usd-core', 'yaml': 'pyyaml'}
