@@ -190,7 +190,7 @@ bags: $(INSTALLED)
 
 # The pictures and the generated tables in README.md and docs/.
 docs: $(TOOLS)
-	$(VENV)/bin/python docs/figures/misprints.py
+	$(VENV)/bin/python docs/figures/errata.py
 	$(VENV)/bin/python docs/figures/draw.py
 	$(VENV)/bin/python docs/figures/hexapod.py
 	$(VENV)/bin/python docs/figures/cranks.py

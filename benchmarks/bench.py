@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument('--samples', type=int, default=inverse_dynamics.SAMPLES,
                         help='in a batch (%(default)s)')
     parser.add_argument('--starts', type=int, default=12, help='of each program (%(default)s)')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     if min(options.rounds, options.samples, options.starts) < 1:
         parser.error('--rounds, --samples and --starts must be at least 1')

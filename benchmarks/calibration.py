@@ -95,7 +95,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
     parser.add_argument('--seeds', type=int, default=2000)
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     bench = Bench(Parameters.from_yaml(HERE.parent / 'config' / 'platform.yaml'))
     lines = [f'{processor_name()}, Python {computer.python_version()}, numpy {np.__version__}, '

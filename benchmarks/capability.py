@@ -330,7 +330,7 @@ def main() -> None:
     parser.add_argument('--boxes', type=int, default=200, help='(%(default)s)')
     parser.add_argument('--poses', type=int, default=1_000_000, help='of a box (%(default)s)')
     parser.add_argument('--write', action='store_true',
-                        help='put the tables that are whole into README.md')
+                        help='put the tables that are whole into results/')
     options = parser.parse_args()
     if min(options.hexapods, options.travels, options.boxes, options.poses) < 1:
         parser.error('--hexapods, --travels, --boxes and --poses must be at least 1')

@@ -252,7 +252,7 @@ def main() -> None:
     parser.add_argument('--latency', action='store_true', help='of the node')
     parser.add_argument('--rounds', type=int, default=6, help='turns of each node')
     parser.add_argument('--turn', type=float, default=10.0, help='duration of a turn [s]')
-    parser.add_argument('--write', action='store_true', help='put the latency into README.md')
+    parser.add_argument('--write', action='store_true', help='put the latency into results/')
     parser.add_argument('--bare', action='store_true', help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.bare:

@@ -57,7 +57,7 @@ def main() -> None:
     parser.add_argument('--params', type=Path, default=HERE.parent / 'config' / 'platform.yaml')
     parser.add_argument('--seed', type=int, default=0)
     parser.add_argument('--generations', type=int, default=DesignOptions().generations)
-    parser.add_argument('--write', action='store_true', help='put the table into README.md')
+    parser.add_argument('--write', action='store_true', help='put the table into results/')
     options = parser.parse_args()
     parameters = Parameters.from_yaml(options.params)
     asked = DesignOptions(seed=options.seed, generations=options.generations)

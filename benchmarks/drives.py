@@ -73,7 +73,7 @@ def measure() -> list[str]:
 def main() -> None:
     """Measure, and print the table or write it."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--write', action='store_true', help='into README.md')
+    parser.add_argument('--write', action='store_true', help='into results/')
     arguments = parser.parse_args()
     lines = measure()
     if arguments.write:

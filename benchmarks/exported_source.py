@@ -19,7 +19,7 @@ import tempfile
 import time
 from typing import Any, NamedTuple
 
-from inverse_dynamics import markdown, processor_name, README, write
+from inverse_dynamics import markdown, processor_name, RESULTS, write
 import numpy as np
 from numpy.typing import NDArray
 
@@ -106,10 +106,10 @@ def library_calls(platform: StewartPlatform, rows: Array) -> Times:
 
 def node_row() -> tuple[str, ...]:
     """Return the row of the node, from the table that ``make bench-node`` has written."""
-    row = next(line for line in README.read_text(encoding='utf-8').splitlines()
+    row = next(line for line in (RESULTS / 'node.md').read_text(encoding='utf-8').splitlines()
                if line.startswith(NODE_ROW))
     p50, _, p999, most = (int(cell.replace(',', '')) for cell in row.split('|')[2:6])
-    return ('the node at 1 kHz, from message to message ([Node](#node))', f'{1000 * p50:,}', '',
+    return ('the node at 1 kHz, from message to message ([Node](node.md))', f'{1000 * p50:,}', '',
             f'{1000 * p999:,}', f'{most:,}')
 
 
@@ -184,7 +184,7 @@ def run() -> list[str]:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     lines = run()
     print('\n'.join(lines))

@@ -46,7 +46,7 @@ def turns_about(axes: Any, angle: float) -> Any:
 
 
 def legal_poses(platform: StewartPlatform, random: np.random.Generator, many: int) -> Motion:
-    """Return poses all over the workspace that README.md states."""
+    """Return poses all over the workspace that results/forward.md states."""
     p, found = platform.parameters, []
     while sum(map(len, found)) < many:
         motion = Motion(

@@ -267,7 +267,7 @@ def main() -> None:
     parser.add_argument('--device', choices=('cpu', 'cuda'), default='cuda')
     parser.add_argument('--small', action='store_true', help='fewer, to see that it runs')
     parser.add_argument('--rounds', type=int, default=7, help='of each call (%(default)s)')
-    parser.add_argument('--write', action='store_true', help='put the table into README.md')
+    parser.add_argument('--write', action='store_true', help='put the table into results/')
     options = parser.parse_args()
     gpu = options.device == 'cuda'
     try:

@@ -270,7 +270,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
     parser.add_argument('--seeds', type=int, default=500, help='of the coverage (%(default)s)')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     lines = ['', *cost(), '']
     with tempfile.TemporaryDirectory() as name:

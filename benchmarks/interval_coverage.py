@@ -334,7 +334,7 @@ def main() -> None:
     parser.add_argument('--legs', choices=list(CASES), default='telescopic', help='kind of legs')
     parser.add_argument('--no-friction', dest='friction', action='store_false',
                         help='neither the hexapods nor the file have friction')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     motions = [each for each in (*MOTIONS, *(f'{PAYLOAD}{each}' for each in OF_PAYLOAD))
                if options.only in each and (

@@ -37,7 +37,7 @@ from stewart_dynamics.parameters.table import inertia_matrix
 Array = NDArray[np.float64]
 
 HERE = Path(__file__).parent
-README = HERE / 'README.md'
+RESULTS = HERE / 'results'
 BEGIN, END = '<!-- measured: begin -->', '<!-- measured: end -->'
 C_COMPILER = ['gcc', '-std=c99', '-O3', '-march=native', '-ffp-contract=off']
 
@@ -431,11 +431,12 @@ def processor_name() -> str:
 
 
 def write(lines: list[str], begin: str = BEGIN, end: str = END) -> None:
-    """Put the lines between the README's markers."""
-    before, rest = README.read_text(encoding='utf-8').split(begin)
+    """Put the lines between the markers, which stand in one of the files of results/."""
+    page, text = next((page, text) for page in RESULTS.glob('*.md')
+                      if begin in (text := page.read_text(encoding='utf-8')))
+    before, rest = text.split(begin)
     _, after = rest.split(end)
-    text = '\n'.join([before + begin, *lines, end + after])
-    README.write_text(text, encoding='utf-8')
+    page.write_text('\n'.join([before + begin, *lines, end + after]), encoding='utf-8')
 
 
 def run(rounds: int, samples: int = SAMPLES) -> tuple[list[str], list[Figure]]:

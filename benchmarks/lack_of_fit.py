@@ -240,7 +240,7 @@ def main() -> None:
     parser.add_argument('--right', type=int, default=10,
                         help='of each kind of right recordings (%(default)s)')
     parser.add_argument('--only', default='', help='errors that contain this text')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     lines = causes_named(options.seeds, options.only) if options.seeds else []
     print('\n'.join(lines), flush=True)

@@ -456,7 +456,7 @@ def main() -> None:
                         help='of the long run; 0: none (%(default)s)')
     parser.add_argument('--parts', nargs='+', choices=PARTS, default=PARTS,
                         help='what is measured (all of it)')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     if options.rounds < 1 or options.seconds < 1 or options.minutes < 0:
         parser.error('--rounds and --seconds must be at least 1, --minutes 0')

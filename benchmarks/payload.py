@@ -139,7 +139,7 @@ def main() -> None:
     parser.add_argument('--coverage', action='store_true',
                         help='how often the intervals hold, in place of the latency')
     parser.add_argument('--seeds', type=int, default=SEEDS, help='for that (%(default)s)')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     if min(options.rounds, options.seconds, options.seeds) < 1:
         parser.error('--rounds, --seconds and --seeds must be at least 1')

@@ -115,7 +115,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
     parser.add_argument('--rounds', type=int, default=ROUNDS, help='turns of each (%(default)s)')
     parser.add_argument('--seconds', type=int, default=SECONDS, help='of a turn (%(default)s)')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     if options.rounds < 1 or options.seconds < 1:
         parser.error('--rounds and --seconds must be at least 1')

@@ -129,7 +129,7 @@ def main() -> None:
         listen(sys.argv[2:])
         return
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument('--write', action='store_true', help='put the table into README.md')
+    parser.add_argument('--write', action='store_true', help='put the table into results/')
     options = parser.parse_args()
     cells = [('setpoints', 'nodes', 'published at', 'late by a period', 'lost', 'of a core'),
              *(measure(rate, many) for rate, many in CASES)]

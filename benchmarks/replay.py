@@ -387,7 +387,7 @@ def main() -> None:
     parser.add_argument('--folder', type=Path,
                         help="for bags and results, removed afterwards; default: the system's")
     parser.add_argument('--json', type=Path, help='keep every turn in this file')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     if options.rounds < 1 or options.setpoints < 2 or options.long < 0:
         parser.error('--rounds must be at least 1, --setpoints 2, --long 0')

@@ -87,7 +87,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
     parser.add_argument('--seeds', type=int, default=3, help='of each case (%(default)s)')
     parser.add_argument('--only', default='', help='kinds that contain this text')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     lines = [*study(options.seeds, options.only), measured_on(), '']
     print('\n'.join(lines))

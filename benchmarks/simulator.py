@@ -248,7 +248,7 @@ def main() -> None:
     parser.add_argument('--rounds', type=int, default=ROUNDS, help='turns of each (%(default)s)')
     parser.add_argument('--seconds', type=int, default=SECONDS,
                         help='of each run of the node (%(default)s)')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    parser.add_argument('--write', action='store_true', help='put the tables into results/')
     options = parser.parse_args()
     if options.rounds < 1 or options.seconds < 1:
         parser.error('--rounds and --seconds must be at least 1')

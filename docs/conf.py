@@ -102,6 +102,7 @@ def lead_to_pages(*arguments: Any) -> None:
         content[0] = content[0].replace('](docs/', '](')
     content[0] = content[0].replace('](../CONTRIBUTING.md', '](contributing.md')
     content[0] = re.sub(r'\]\(\.\./benchmarks/README\.md', '](performance.md', content[0])
+    content[0] = content[0].replace('](../benchmarks/results/', '](results/')
     content[0] = re.sub(r'\]\(\.\./security/README\.md', '](security.md', content[0])
 
 

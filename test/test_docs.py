@@ -79,11 +79,14 @@ def test_every_page_is_on_the_site(site: dict[str, Page]) -> None:
     assert {f'{page}.html' for page in pages} <= set(site)
     linked = {link.split('#')[0] for link in site['index.html'].links}
     assert {f'{page}.html' for page in pages - {'index'}} <= linked
+    for page in (ROOT / 'benchmarks' / 'results').iterdir():
+        assert f'results/{page.stem}.html' in site['performance.html'].links
 
 
 def test_links_of_the_site_lead_to_pages_and_anchors(site: dict[str, Page]) -> None:
     checked = 0
-    for page in site.values():
+    of_path = {page.path: page for page in site.values()}
+    for page in of_path.values():
         for link in page.links:
             parts = urlsplit(link)
             if parts.scheme or parts.netloc:
@@ -94,7 +97,7 @@ def test_links_of_the_site_lead_to_pages_and_anchors(site: dict[str, Page]) -> N
             assert target.is_file(), f'{page.path.name}: {link}'
             assert target.suffix != '.md', f'{page.path.name}: {link}'  # a download
             if parts.fragment and target.suffix == '.html':
-                found = site.get(target.name) or Page(target)
+                found = of_path.get(target) or Page(target)
                 assert unquote(parts.fragment) in found.anchors, f'{page.path.name}: {link}'
             checked += 1
     assert checked > 500

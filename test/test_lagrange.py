@@ -158,13 +158,13 @@ def test_a_leg_s_mass_is_its_piston_s_along_it_and_its_turning_inertia_across(
     assert relative(values, np.sort(np.stack([across, across, along], axis=-1), axis=-1)) < 1e-13
 
 
-# docs/misprints.md
+# docs/errata.md
 
 @pytest.fixture(scope='module')
-def misprints() -> Any:
+def errata() -> Any:
     """Return the script that writes the table."""
-    path = ROOT / 'docs' / 'figures' / 'misprints.py'
-    spec = importlib.util.spec_from_file_location('misprints', path)
+    path = ROOT / 'docs' / 'figures' / 'errata.py'
+    spec = importlib.util.spec_from_file_location('errata', path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -173,24 +173,24 @@ def misprints() -> Any:
 
 
 def test_the_paper_with_every_line_corrected_gives_the_forces_of_the_package(
-        misprints: Any) -> None:
-    p = misprints.hexapod()
-    states = misprints.random_states(p)
+        errata: Any) -> None:
+    p = errata.hexapod()
+    states = errata.random_states(p)
     package = StewartPlatform(p).inverse_dynamics(Motion.from_euler(*states)).forces
-    assert each_relative(misprints.leg_forces(p, states), package) < 1e-12
+    assert each_relative(errata.leg_forces(p, states), package) < 1e-12
 
 
-def test_the_table_of_misprints_is_what_its_script_writes_now(misprints: Any) -> None:
-    assert (ROOT / 'docs' / 'misprints.md').read_text(encoding='utf-8') == misprints.table(), (
-        'run: python docs/figures/misprints.py')
+def test_the_table_of_errata_is_what_its_script_writes_now(errata: Any) -> None:
+    assert (ROOT / 'docs' / 'errata.md').read_text(encoding='utf-8') == errata.table(), (
+        'run: python docs/figures/errata.py')
 
 
-def test_every_misprint_with_a_reading_of_its_own_changes_the_forces(misprints: Any) -> None:
-    p = misprints.hexapod()
-    states = misprints.random_states(p)
-    assert len(misprints.KEYS) == 6
-    for key in misprints.KEYS:
-        median, worst = misprints.effect(p, states, {key})
+def test_every_erratum_with_a_reading_of_its_own_changes_the_forces(errata: Any) -> None:
+    p = errata.hexapod()
+    states = errata.random_states(p)
+    assert len(errata.KEYS) == 6
+    for key in errata.KEYS:
+        median, worst = errata.effect(p, states, {key})
         assert 0.0 < median < worst
 
 

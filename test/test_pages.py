@@ -34,7 +34,8 @@ from stewart_dynamics.setpoints.output_messages import MOTOR_STATES, MOTOR_TYPES
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.simulator import state_messages as simulator_messages
 
-PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*/README.md'), *ROOT.glob('docs/*.md')])
+PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*/README.md'), *ROOT.glob('docs/*.md'),
+                *ROOT.glob('benchmarks/results/*.md')])
 TEXTS = {page.relative_to(ROOT).as_posix(): page.read_text(encoding='utf-8') for page in PAGES}
 README = TEXTS['README.md']
 

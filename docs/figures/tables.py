@@ -7,7 +7,7 @@ Write the generated tables, security/policy.xml, the controller's parameters, th
     python docs/figures/tables.py
 
 Parameters and topics come from the tables of the code, measured figures from
-benchmarks/README.md, the errors in the loop from the files in docs/figures/. Each table is between
+benchmarks/results/, the errors in the loop from the files in docs/figures/. Each table is between
 two comments of its page.
 """
 
@@ -277,10 +277,11 @@ def _digits(number: float) -> str:
     return f'{number:.0f}' if number >= 100.0 else f'{number:.3g}'
 
 
-def measured(row: str, column: str) -> str:
-    """Return a figure of benchmarks/README.md: the first table that has both row and column."""
+def measured(page: str, row: str, column: str) -> str:
+    """Return a figure of benchmarks/results/: that of the first table with both row and column."""
+    file = ROOT / 'benchmarks' / 'results' / f'{page}.md'
     head: list[str] = []
-    for line in (ROOT / 'benchmarks' / 'README.md').read_text(encoding='utf-8').splitlines():
+    for line in file.read_text(encoding='utf-8').splitlines():
         cells = [cell.strip() for cell in line.strip('|').split('|')] if line[:1] == '|' else []
         if not cells:
             head = []
@@ -288,28 +289,65 @@ def measured(row: str, column: str) -> str:
             head = cells
         elif cells[0] == row and column in head:
             return cells[head.index(column)]
-    raise SystemExit(f'benchmarks/README.md: no table has row {row!r} and column {column!r}')
+    raise SystemExit(f'{file.name}: no table has row {row!r} and column {column!r}')
 
 
-def accuracy_and_speed() -> str:
-    """Return four figures of the tables below them."""
-    call, times = '`StewartPlatform.inverse_dynamics`, one `Motion`', 'times `pin.rnea` alone'
-    node, replay = 'separate, `stewart_dynamics`', '`stewart_replay`'
-    micro = 1e-3 * float(measured(call, 'ns').replace(',', ''))
-    return '\n'.join((
-        '| figure | value | command |', '| --- | --- | --- |',
-        '| largest difference of leg forces from Pinocchio, random hexapods and motions | '
-        '1e-12 of the largest force | `make test` |',
-        '| `platform.inverse_dynamics(motion)` of one sample, compared with `rnea` of Pinocchio | '
-        f'{micro:.1f} us, {measured(call, times)} times | `make bench` |',
-        '| node at 1 kHz: median and 99th percentile of the latency, compared with an rclpy node '
-        'that takes and publishes the same messages and computes nothing; setpoints lost | '
-        f'{measured(node, "p50, times typed")} and {measured(node, "p99, times typed")} times; '
-        f'{measured(node, "lost")} lost | `make bench-node` |',
-        '| replay of 1,000,000 setpoints with all outputs, compared with reading and '
-        'deserializing the same bag with rosbags | '
-        f'{measured(replay, "times rosbags")} times, {measured(replay, "peak memory (MB)")} MB '
-        '| `make bench-replay` |'))
+# What is measured; how the figures are shown; their page, and row and column of each.
+Measured = tuple[str, str, str, tuple[tuple[str, str], ...]]
+_ONE = 'one `Motion`'
+_NODE, _ALL_CORES = 'separate, `stewart_dynamics`', '`StewartPlatform.solve`: the default, all cores'
+SPEED: tuple[Measured, ...] = (
+    ('`platform.inverse_dynamics(motion)` of one sample', '{} ns, {} times `rnea` of Pinocchio',
+     'inverse_dynamics', ((f'`StewartPlatform.inverse_dynamics`, {_ONE}', 'ns'),
+                          (f'`StewartPlatform.inverse_dynamics`, {_ONE}', 'times `pin.rnea` alone'))),
+    ('a sample of a batch, one core; two cores', '{} ns; {} ns', 'inverse_dynamics',
+     (('`solve_many` in C, one core', 'ns'), (_ALL_CORES, 'ns'))),
+    ('`platform.forward_dynamics(motion, forces)`', '{} ns, {} times `aba` of Pinocchio', 'forward',
+     ((f'`StewartPlatform.forward_dynamics`, {_ONE}', 'ns'),
+      (f'`StewartPlatform.forward_dynamics`, {_ONE}', 'times `pin.aba` alone'))),
+    ('`platform.forward_kinematics(lengths, guess)` from 20 % of the height away', '{} ns', 'forward',
+     (('`StewartPlatform.forward_kinematics` from afar, guess a `Pose`', 'ns'),)),
+    ('exported C, `stewart_step`: median, slowest motion, worst with interrupts',
+     '{} ns, {} ns, {} us', 'exported_source', tuple(
+         ('`stewart_step`, gcc', column)
+         for column in ('median (ns)', 'slowest motion (ns)', 'worst (us)'))),
+    ('node at 1 kHz, from the last message of a setpoint to its answer: median, 99th percentile',
+     '{} us, {} us; {} and {} times an rclpy node that takes and publishes the same messages and '
+     'computes nothing', 'node',
+     tuple((_NODE, column) for column in ('p50', 'p99', 'p50, times typed', 'p99, times typed'))),
+    ('node at 1 kHz: share of a core; setpoints lost', '{}; {}', 'node',
+     ((_NODE, 'of a core'), (_NODE, 'lost'))),
+    ('trajectory of 10,000 points, from sending it to its answer: median', '{} ms',
+     'planned_trajectories', (('alone', 'median'),)),
+    ('a period of 1 ms of the simulator, one step', '{} us', 'simulator',
+     (('`Plant.advance`, 1 step', 'us'),)),
+    ('replay of 1,000,000 setpoints with all outputs',
+     '{} s, {} times reading and deserializing the bag with rosbags', 'replay',
+     (('`stewart_replay`', 's'), ('`stewart_replay`', 'times rosbags'))),
+    ('start of the node; of a bare rclpy node', '{} s; {} s', 'starts',
+     (('the node, until it is ready', 's'), ('a bare lifecycle node with the same topics', 's'))),
+    ('`import stewart_dynamics`; with the first inverse dynamics', '{} s; {} s', 'starts',
+     (('`import stewart_dynamics`', 's'), ('the first inverse dynamics of the library', 's'))),
+    ('whole datasheet of `stewart_capability`: processor time; elapsed', '{} s', 'capability',
+     (('whole datasheet with stiffness (s); elapsed', 'measured'),)),
+)
+MEMORY: tuple[Measured, ...] = (
+    ('node at 1 kHz, after one minute and after ten', '{} MB, {} MB', 'node',
+     (('1', 'memory (MB)'), ('10', 'memory (MB)'))),
+    ('replay of 1,000,000 setpoints with all outputs; longer bags need no more', '{} MB', 'replay',
+     (('`stewart_replay`', 'peak memory (MB)'),)),
+    ('identification from one bag of ten minutes at 1 kHz, and from ten', '{} MB, {} MB',
+     'identification', (('1', 'peak memory (MB)'), ('10', 'peak memory (MB)'))),
+    ('code and constants of the exported source, gcc -O2; -Os', '{} bytes; {} bytes',
+     'exported_source', (('gcc -O2', 'code (bytes)'), ('gcc -Os', 'code (bytes)'))),
+)
+
+
+def figures_of(results: Sequence[Measured]) -> str:
+    """Return a table of measured figures, each with a link to the page of its table."""
+    return '\n'.join(['| figure | value | table |', '| --- | --- | --- |', *(
+        f'| {what} | {words.format(*(measured(page, *cell) for cell in cells))} | '
+        f'[{page.replace("_", " ")}](results/{page}.md) |' for what, words, page, cells in results)])
 
 
 def pages() -> dict[Path, dict[str, str]]:
@@ -317,7 +355,8 @@ def pages() -> dict[Path, dict[str, str]]:
     figures, on_a_ship, known = (json.loads((HERE / f'{name}.json').read_text(encoding='utf-8'))
                                  for name in ('loop', 'ship', 'identify'))
     return {
-        ROOT / 'benchmarks' / 'README.md': {'accuracy and speed': accuracy_and_speed()},
+        ROOT / 'benchmarks' / 'README.md': {
+            'speed': figures_of(SPEED), 'memory': figures_of(MEMORY)},
         ROOT / 'docs' / 'node.md': {
             'subscribed topics': topics('subscribed', SUBSCRIBED),
             'published topics': topics('published', PUBLISHED)},

@@ -8,7 +8,7 @@ The Lagrange equations as the paper assembles them: the readable reference.
 base axes. Where screws turn with their legs, their J_q replaces J_inv for the forces f and the
 reflected masses: ``turning_screws``. Numbers in brackets are equations of Alwan and Sarhan,
 Dynamic Analysis of Gough Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon
-Eng. Sci. 26(10), 2018, in their correct form: docs/misprints.md lists the misprints.
+Eng. Sci. 26(10), 2018, in their correct form: docs/errata.md lists the errata.
 ``inverse_dynamics`` computes the same forces without a matrix and is validated against these.
 Every function takes any leading shape of samples.
 """

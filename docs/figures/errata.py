@@ -3,9 +3,9 @@
 
 
 """
-Write docs/misprints.md: the paper's misprints, and the error of the leg forces that each causes.
+Write docs/errata.md: the errata of the paper, and the error of the leg forces that each causes.
 
-    python docs/figures/misprints.py
+    python docs/figures/errata.py
 
 Run it again when config/platform.yaml has changed. The paper is Alwan and Sarhan, Dynamic
 Analysis of Gough Stewart Robot Manipulator by Using Lagrange Formulation in Matlab Software,
@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 HEXAPOD = ROOT / 'config' / 'platform.yaml'
-TABLE = ROOT / 'docs' / 'misprints.md'
+TABLE = ROOT / 'docs' / 'errata.md'
 
 SEED = 2018
 STATES = 1000
@@ -47,7 +47,7 @@ NO_ACTUATORS = {'actuator.reflected_mass': 0.0, 'actuator.viscous_friction': 0.0
                 'actuator.coulomb_friction': 0.0}
 
 
-class Misprint(NamedTuple):
+class Erratum(NamedTuple):
     """A misprinted line of the paper; without a key, its reading here changes no force."""
 
     key: str
@@ -57,33 +57,33 @@ class Misprint(NamedTuple):
     reading: str = ''
 
 
-MISPRINTS = (
-    Misprint('local joint', 'section 5, whole manipulator: J_i and its derivative',
+ERRATA = (
+    Erratum('local joint', 'section 5, whole manipulator: J_i and its derivative',
              '`J_i = [1, -skew(P_i)]`, P_i in platform axes', '`J_i = [1, -skew(R P_i)]`'),
-    Misprint('half', '(6)', '`C_pl = 1/2 diag(0, skew(w) I_pl)`', '`diag(0, skew(w) I_pl)`'),
-    Misprint('equivalent mass', 'section 5, linkages: m_eq',
+    Erratum('half', '(6)', '`C_pl = 1/2 diag(0, skew(w) I_pl)`', '`diag(0, skew(w) I_pl)`'),
+    Erratum('equivalent mass', 'section 5, linkages: m_eq',
              '`m_eq = (m1 S1^2 + m2 S2^2) / L^2`, S2 from the upper joint',
              '`(m1 S1^2 + m2 (L - S2)^2) / L^2`'),
-    Misprint('coriolis mass', 'section 5, linkages: C_Li',
+    Erratum('coriolis mass', 'section 5, linkages: C_Li',
              '`m2 S2 / L - (I_eq + L^2 m_eq) / L^2`',
              '`m2 (L - S2) / L - (I_eq + L^2 m_eq) / L^2`'),
-    Misprint('leg gravity', 'section 5, linkages: G_Li',
+    Erratum('leg gravity', 'section 5, linkages: G_Li',
              '`(m1 S1 + m2 (L - S2)) skew(U)^2`', '`(m1 S1 + m2 (L - S2)) / L skew(U)^2`',
              'has kg m in place of kg: taken as the number in SI units'),
-    Misprint('', "section 5, whole manipulator: the linkages' equation, in both of its lines",
+    Erratum('', "section 5, whole manipulator: the linkages' equation, in both of its lines",
              "`M_Li x_Li'' + C_Li x_Li' + G_Li = (J^-1)^T F_Li`",
              "`M_Li x_Li'' + C_Li x_Li' + G_Li = F_Li`",
              'three numbers on the left, six on the right: F_Li is the force at the platform '
              'joint of the leg, and `J_i^T F_Li` its part of the six'),
-    Misprint('', 'section 5, whole manipulator: G_lini', '`J_i^T G_Li J_i`', '`J_i^T G_Li`',
+    Erratum('', 'section 5, whole manipulator: G_lini', '`J_i^T G_Li J_i`', '`J_i^T G_Li`',
              'the shapes do not match: the second J_i is left out'),
-    Misprint('', 'section 5, whole manipulator: last line',
+    Erratum('', 'section 5, whole manipulator: last line',
              "`(J^T)^-1 (M x'' + C x' + G) = F`", "`(J_inv^T)^-1 (M x'' + C x' + G) = F`",
              'the units match if J is the matrix of (3), which the text calls the Jacobian'),
-    Misprint('angle rates', 'section 4: angular velocity of the platform',
+    Erratum('angle rates', 'section 4: angular velocity of the platform',
              "`w = [alpha', beta', gamma']`", "`w = E [alpha', beta', gamma']`"),
 )
-KEYS = tuple(misprint.key for misprint in MISPRINTS if misprint.key)
+KEYS = tuple(erratum.key for erratum in ERRATA if erratum.key)
 
 
 class States(NamedTuple):
@@ -218,25 +218,25 @@ def hexapod() -> Parameters:
 
 
 def table() -> str:
-    """Return the text of docs/misprints.md."""
+    """Return the text of docs/errata.md."""
     p = hexapod()
     at = random_states(p)
     lines = []
-    for misprint in MISPRINTS:
-        if misprint.key:
-            median, worst = map(_shown, effect(p, at, {misprint.key}))
+    for erratum in ERRATA:
+        if erratum.key:
+            median, worst = map(_shown, effect(p, at, {erratum.key}))
         else:
             median = worst = 'none'
-        lines.append(f'| {misprint.where} | {misprint.printed} | {misprint.correct} | '
-                     f'{median} | {worst} | {misprint.reading} |')
+        lines.append(f'| {erratum.where} | {erratum.printed} | {erratum.correct} | '
+                     f'{median} | {worst} | {erratum.reading} |')
     median, worst = map(_shown, effect(p, at, KEYS))
     lines.append(f'| all of them at once | | | {median} | {worst} | |')
     x, y, z = CENTER
     dx, dy, dz = POSITION
     alpha, beta, gamma = np.degrees(ANGLES)
     return f"""\
-<!-- Written by docs/figures/misprints.py (make docs): do not edit this file. -->
-# Misprints in the paper
+<!-- Written by docs/figures/errata.py (make docs): do not edit this file. -->
+# Errata of the paper
 
 The package computes with the equations of H. M. Alwan and R. A. Sarhan, *Dynamic Analysis of
 Gough Stewart Robot Manipulator by Using Lagrange Formulation in Matlab Software*, Journal of
