@@ -33,6 +33,7 @@ from stewart_dynamics.setpoints.input_messages import BASE_SOURCES
 from stewart_dynamics.setpoints.output_messages import MOTOR_STATES, MOTOR_TYPES
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.simulator import state_messages as simulator_messages
+import yaml
 
 PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*/README.md'), *ROOT.glob('docs/*.md'),
                 *ROOT.glob('benchmarks/results/*.md')])
@@ -165,7 +166,7 @@ def test_version_is_the_same_everywhere() -> None:
         rf'{re.escape(version)} \(\d{{4}}-\d\d-\d\d\)', newest)
 
 
-# docs/faults.md: each row names its tests, and each test of faults has a row
+# docs/faults.md: each row has tests, and each test of faults a row
 
 HERE = Path(__file__).parent
 
@@ -177,13 +178,17 @@ def names_in(*files: str) -> set[str]:
 
 
 def test_every_fault_has_a_test_and_every_test_of_faults_a_row() -> None:
-    page = (ROOT / 'docs' / 'faults.md').read_text(encoding='utf-8')
-    rows = [line for line in page.splitlines() if re.match(r'\| .* \|$', line)
-            and len(line.split(' | ')) == 5 and not line.startswith(('| fault', '| ---'))]
-    assert len(rows) > 50
-    named = [re.findall(r'`(test_\w+)`', row.split(' | ')[-1]) for row in rows]
-    assert all(named)
-    found = {name for names in named for name in names}
+    """Both sides of test/data/faults.yaml: the rows of the page, and the tests."""
+    given = yaml.safe_load((HERE / 'data' / 'faults.yaml').read_text(encoding='utf-8'))
+    assert all(row['tests'] for rows in given.values() for row in rows)
+    sections = TEXTS['docs/faults.md'].split('\n## ')[1:]
+    rows = {section.partition('\n')[0]: [
+        cells[1].strip() for line in section.splitlines()
+        if len(cells := line.split('|')) == 6 and not line.startswith(('| fault', '| ---'))]
+        for section in sections}
+    assert {name: of for name, of in rows.items() if of} == {
+        name: [row['fault'] for row in of] for name, of in given.items()}
+    found = {name for rows in given.values() for row in rows for name in row['tests']}
     assert not found - names_in('test_*.py')
     assert not names_in('test_faults.py') - found
 

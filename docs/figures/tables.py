@@ -292,7 +292,7 @@ def measured(page: str, row: str, column: str) -> str:
     raise SystemExit(f'{file.name}: no table has row {row!r} and column {column!r}')
 
 
-# What is measured; how the figures are shown; their page, and row and column of each.
+# A quantity, the words around its figures, their page, and row and column of each.
 Measured = tuple[str, str, str, tuple[tuple[str, str], ...]]
 _ONE = 'one `Motion`'
 _NODE, _ALL_CORES = 'separate, `stewart_dynamics`', '`StewartPlatform.solve`: the default, all cores'
