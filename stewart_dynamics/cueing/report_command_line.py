@@ -115,7 +115,7 @@ def _text(result: dict[str, object]) -> str:
     assert isinstance(used, dict) and isinstance(held, dict) and isinstance(gains, list)
     lines = [f'{result["duration_s"]:.1f} s, largest use: ' + ', '.join(
         f'{name} {100.0 * value:.0f} %' for name, value in used.items())]
-    lines += [f'held back by {name} for {value:.2f} s' for name, value in held.items()]
+    lines += [f'held back by {name} for {value:.3f} s' for name, value in held.items()]
     lines += [f'{gain["name"]}, {gain["axis"].rpartition(" ")[2]}: {gain["before"]:g} -> '
               f'{gain["value"]:g}: {gain["reason"]}' for gain in gains]
     return '\n'.join(lines)

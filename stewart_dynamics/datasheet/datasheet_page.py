@@ -18,7 +18,7 @@ from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, both_payloads, both_ways, box_verdict, DEGREE, down, limit_name, LINEAR, MM,
-    motion_verdict, numbers, OF_DRIVES, payloads_in_words, possible, rated_payload,
+    motion_verdict, numbers, OF_DRIVES, payloads_in_words, pose_row, possible, rated_payload,
     setpoints_used, span, stuck_rows, TORQUES, uncertain_line, Unit, unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
 from stewart_dynamics.datasheet.pose_ratings import AXES, grid, Payloads, poses_of
@@ -327,9 +327,7 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: st
     inertia = inertia_matrix(p.carried.inertia)
 
     rows = [
-        ('Rated pose' + (', home' if sheet['pose']['home'] else ''),
-         numbers(sheet['pose']['position'], 1e3, ' mm') + '; '
-         + numbers(sheet['pose']['angles'], DEGREE.factor, '°')),
+        pose_row(sheet['pose']),
         ('Pivot, platform frame', numbers(sheet['pivot'], 1e3, ' mm')),
         *([('Pivot at the rated pose', numbers(sheet['pose']['pivot_position'], 1e3, ' mm'))]
           if any(sheet['pivot']) else []),

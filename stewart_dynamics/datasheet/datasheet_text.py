@@ -100,11 +100,18 @@ def numbers(values: Any, factor: float = 1.0, unit: str = '') -> str:
     return f'{", ".join(texts)}{unit}'.replace('-', '−')
 
 
+def pose_row(pose: Mapping[str, Any]) -> tuple[str, str]:
+    """Return name and numbers of the rated pose."""
+    return 'Rated pose' + (', home' if pose['home'] else ''), (
+        numbers(pose['position'], 1e3, ' mm') + '; '
+        + numbers(pose['angles'], DEGREE.factor, '°'))
+
+
 def sheet_text(sheet: dict[str, Any]) -> str:
-    """Return travel, payload, and whether box and motion are possible."""
+    """Return rated pose, travel, payload, and whether box and motion are possible."""
     at_once = sheet['at_once']
-    lines = [f'{sheet["name"]}: travel of each axis alone' + (
-        ', all at once' if at_once else '')]
+    lines = [f'{sheet["name"]}: ' + ': '.join(pose_row(sheet['pose'])).lower(),
+             'travel of each axis alone' + (', all at once' if at_once else '')]
     for axis in AXES:
         unit = unit_of(axis, 'travel')
         line = f'  {axis:<3} {both_ways(sheet["travel"], axis, unit):>20} {unit.name:<3}'

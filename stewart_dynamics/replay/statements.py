@@ -66,8 +66,14 @@ class Statement(NamedTuple):
     @property
     def line(self) -> str:
         """Return the whole sentence."""
-        time = '' if self.at is None else f' at t = {self.at:.2f} s'
-        return f'{self.text}{time}{self.end}'
+        return f'{self.text}{"" if self.at is None else at_time(self.at, 2)}{self.end}'
+
+
+def at_time(seconds: float, digits: int) -> str:
+    """Return the words for a time since the first setpoint, which other topics may precede."""
+    if round(seconds, digits) < 0.0:
+        return f' {-seconds:.{digits}f} s before the first setpoint'
+    return f' at t = {seconds:.{digits}f} s'
 
 
 def statements(summary: Summary) -> list[Statement]:

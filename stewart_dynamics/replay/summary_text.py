@@ -15,7 +15,8 @@ from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.statements import (
-    INPUTS, JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING, SINGULARITY)
+    at_time, INPUTS, JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING,
+    SINGULARITY)
 from stewart_dynamics.replay.summary import key_of, kind_in, LegKeys
 from stewart_dynamics.reporting.pages import decimals_of, fixed
 from stewart_dynamics.response.axes_response import AXES
@@ -38,7 +39,7 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
     lines += [notice for notice in summary['notices'] if notice not in mistakes]
     for each in summary['rejected']:
         rejection = Rejection(each['topic'], each['reason']).counted(each['count'])
-        when = '' if each['first_at_s'] is None else f' at t = {each["first_at_s"]:.3f} s'
+        when = '' if each['first_at_s'] is None else at_time(each['first_at_s'], 3)
         lines.append(rejection.words(f'first{when}: {each["first"]}' if each['first'] else ''))
     return '\n'.join(lines)
 
