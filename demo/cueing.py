@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Motion cueing of a drive through town: wanted and felt as a picture, and the use of the hexapod.
+Motion cueing of a drive through town: demanded and achieved as a picture, and use of limits.
 
 ``make demo-cueing`` runs it. The drive is that of examples/town_drive.py.
 """
@@ -57,8 +57,8 @@ def main() -> None:
     figure, axes = pyplot.subplots(len(CURVES) + 1, 1, sharex=True, figsize=(9.0, 9.5),
                                    layout='constrained')
     for axis, (n, title) in zip(axes, CURVES, strict=False):
-        axis.plot(vehicle.times, found.wanted[:, n], color=WANTED, lw=1.1, label='wanted')
-        axis.plot(vehicle.times, found.felt[:, n], color=FELT, lw=1.2, label='felt')
+        axis.plot(vehicle.times, found.wanted[:, n], color=WANTED, lw=1.1, label='demanded')
+        axis.plot(vehicle.times, found.felt[:, n], color=FELT, lw=1.2, label='achieved')
         axis.set_ylabel(title)
     axes[0].legend(loc='lower left', ncols=2, frameon=False)
     for name, each in used.items():
@@ -75,7 +75,9 @@ def main() -> None:
     figure.savefig(output, dpi=110, metadata={'Software': None})
     print(f'a drive of {vehicle.times[-1]:.0f} s, computed in {seconds:.2f} s; largest use: '
           + ', '.join(f'{name} {each.max():.0%}' for name, each in used.items()))
-    print(f'held back by limits: {sum(found.held.values()):.2f} s\n{output}')
+    held = sum(found.held.values())
+    print(f'limits held it back for {held:.3f} s' if held else 'no limit held it back', output,
+          sep='\n')
 
 
 if __name__ == '__main__':

@@ -157,7 +157,7 @@ def test_the_card_of_the_motors_says_whether_their_limits_are_held() -> None:
     ample = {'torque_max': 1e3, 'torque_continuous': 1e2, 'speed_max': 1e4, 'torque_speed': None}
     assert card(**ample)[:2] == ('good', 'Motors are large enough')
     said = [each.line for of in of_limits(P, **ample).values() for each in of.statements]
-    assert said.count('all limits of the motors held') == 1
+    assert said.count('within all limits of the motors') == 1
     assert card(**ample, efficiency=None).level == 'good'
     assert card(**ample | {'torque_continuous': 1e-3}).level == 'warn'
     exceeded = card(**ample | {'torque_max': 1e-2, 'torque_continuous': None})

@@ -662,7 +662,7 @@ def test_sqlite3_is_read_in_the_order_of_time(tmp_path: Path) -> None:
     for path in (bag, storage(bag)):
         found = read(path)
         assert found[:2] == (given_, [])
-        assert not found.notices  # the format has no checksums: nothing to be mended
+        assert not found.notices  # the format has no checksums: nothing to be repaired
     assert read(bag, f'{NODE}/{TWIST}').messages == [
         each for each in given_ if each[0].endswith(TWIST)]
     assert [path.name for path in tmp_path.iterdir()] == [bag.name]

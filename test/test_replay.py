@@ -447,7 +447,7 @@ def test_a_bag_of_poses_is_quasi_static(
         assert run(bag, tmp_path / f'{code}', '--strict', *options, params=params) == code
         text = capsys.readouterr().out
         assert ('limits.velocity_max could not be checked' in text) is (code == LIMIT_MET)
-        assert ('all limits held' in text) is (code == DONE)
+        assert ('within all limits' in text) is (code == DONE)
 
 
 def test_control_characters_in_names_are_escaped(
@@ -600,7 +600,7 @@ def test_twists_that_are_not_those_of_the_poses_are_no_motion_that_holds_all_lim
     assert run(bag, tmp_path / 'out') == DONE
     assert run(bag, tmp_path / 'strict', '--strict') == LIMIT_MET
     printed = ' '.join(capsys.readouterr().out.split())  # without line breaks
-    assert 'all limits held' not in printed
+    assert 'within all limits' not in printed
     assert 'no limit was met by inputs that contradict each other' in printed
     found = summary_of(tmp_path / 'out' / 'bag')['mistakes']
     # accelerations are too small to matter

@@ -595,7 +595,7 @@ FORCE_LIMIT = {'limits.force_max': 5.0}
 
 
 @pytest.mark.parametrize(('given_', 'limits', 'shown', 'absent'), [
-    ({'many': 1}, FORCE_LIMIT, 'all limits held', 'singularity warning at'),
+    ({'many': 1}, FORCE_LIMIT, 'within all limits', 'singularity warning at'),
     ({'many': 1}, FORCE_LIMIT, '1 setpoint in 0.00 s', ''),
     ({'many': 1}, {}, 'det(J) did not cross zero\nno singularity warning', 'limits'),
     ({'many': 1, 'demanded': 5.0}, FORCE_LIMIT, '5.0*', 'exceeded'),
@@ -603,7 +603,7 @@ FORCE_LIMIT = {'limits.force_max': 5.0}
      'J_inv cannot be solved in 3 setpoints: they have no forces', 'force [N]'),
     ({'many': 3, 'suppressed': 1.0}, {}, 'forces were suppressed in 3 setpoints', ''),
     ({'many': 4, 'demanded': [[1.0] * 6, [math.nan] * 6, [math.nan] * 6, [1.0] * 6]}, FORCE_LIMIT,
-     'limits.force_max could not be checked in 2 setpoints: J_inv cannot', 'all limits held'),
+     'limits.force_max could not be checked in 2 setpoints: J_inv cannot', 'within all limits'),
     ({'many': 5, 'det': [2.0, 1.0, -1.0, -2.0, -3.0], 'warnings': [0, 1, 0, 1, 1]}, {},
      'singularity warning at t = 1.00 s, 0.50 s before the crossing and 1 time more, for 2.00 s',
      ''),
@@ -611,7 +611,7 @@ FORCE_LIMIT = {'limits.force_max': 5.0}
      'det(J) crossed zero at t = 0.50 s and 38 times more: forces grow without bound', ''),
     ({'many': 2, 'demanded': 6.0}, FORCE_LIMIT,
      'limits.force_max, 5 N, exceeded by front left and 5 other legs: 6 N at worst, first at t = '
-     '0.00 s', 'all limits held'),
+     '0.00 s', 'within all limits'),
     ({'many': 5, 'seconds': [0.0, 0.1, 0.2, 3.2, 3.2], 'restarts': [0, 0, 0, 0, 1]}, {},
      '5 setpoints in 3.20 s, of them 3.00 s in 1 gap, 1 restart\n', '')])
 def test_statements_for_the_terminal(
@@ -651,9 +651,9 @@ def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
 
 
 @pytest.mark.parametrize(('mistake', 'level', 'line'), [
-    (None, 'good', 'all limits held by the demands of the setpoints'),
+    (None, 'good', 'within all limits by the demands of the setpoints'),
     ({'what': 'sign', 'text': 'the efforts have the opposite sign'}, 'warn',
-     'all limits held by the demands of the setpoints, which the measured efforts contradict '
+     'within all limits by the demands of the setpoints, which the measured efforts contradict '
      '(likely mistake: sign)')])
 def test_limits_are_held_by_demands_which_measured_efforts_may_contradict(
         mistake: dict[str, str] | None, level: str, line: str) -> None:
@@ -696,7 +696,7 @@ def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     assert found['limit_met']
     text = '\n'.join(summary_lines(found))
     assert 'limits.velocity_max could not be checked' in text
-    assert 'all limits held' not in text
+    assert 'within all limits' not in text
     assert not samples.summary(hexapod(**FORCE_LIMIT), quasi_static=True).values()['limit_met']
 
 

@@ -59,8 +59,8 @@ def _range(*values: Array) -> tuple[float, float]:
 
 
 def over_time(times: Array, wanted: Array, felt: Array, title: str) -> str:
-    """Return a picture of a wanted and a felt quantity over time."""
-    picture = Picture(1160, 190, f'wanted and felt: {title}')
+    """Return a picture of a demanded and an achieved quantity over time."""
+    picture = Picture(1160, 190, f'demanded and achieved: {title}')
     chart = Chart(picture, (60.0, 26.0, 1080.0, 126.0), (0.0, float(times[-1])),
                   _range(wanted, felt))
     chart.draw_axes('time [s]', title, 8)

@@ -229,8 +229,8 @@ def _held(summary: Summary, topic: str, limits: str) -> Statement:
     """Return that limits are held by demands, and whether measured efforts contradict that."""
     measured = summary.get('measured')
     if not measured:
-        return Statement(topic, 'good', f'{limits} held')
-    demands = f'{limits} held by the demands of the setpoints'
+        return Statement(topic, 'good', f'within {limits}')
+    demands = f'within {limits} by the demands of the setpoints'
     mistake = measured.get('likely_mistake')  # not in older summaries
     if mistake is None:
         return Statement(topic, 'good', demands)

@@ -65,7 +65,7 @@ def create_later_service(node: Node, kind: Any, name: str,
 
     rclpy sends what the callback returns, by a method that is replaced here. A coroutine could
     wait, but the events executor does not await it (https://github.com/ros2/rclpy/issues/1473,
-    mended in later releases), and the single-threaded one may not resume it
+    fixed in later releases), and the single-threaded one may not resume it
     (https://github.com/ros2/rclpy/issues/1462).
 
     begin: called at each request with a function that sends the answer, once.
