@@ -35,6 +35,7 @@ import sys
 import termios
 import time
 from typing import Any
+import uuid
 
 from distributed import Client, LocalCluster
 import messages
@@ -48,7 +49,8 @@ from snapshot import Snapshot
 from stewart_dynamics import BagError, Parameters, StewartError
 from stewart_dynamics.bags.find import folders_of_results
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
-from stewart_dynamics.replay.bag_task import finished, kept, replay_task, Task
+from stewart_dynamics.replay.bag_task import finished, kept, replay_task, STOPPED, Task
+from stewart_dynamics.replay.dask_cluster import _on_worker, _stop
 from stewart_dynamics.replay.local_processes import _start_server
 from stewart_dynamics.replay.many_bags import Fleet, replay_fleet
 from stewart_dynamics.replay.one_bag import replay
@@ -669,6 +671,18 @@ def test_a_lost_cluster_is_reported_for_each_bag(
     assert set(rows(output)) == {f'{bag}' for bag, _ in pairs}
     assert hidden(output) == []
     assert 'Traceback' not in capfd.readouterr().err
+
+
+def test_a_worker_begins_no_bag_of_a_run_that_was_stopped(
+        cluster: LocalCluster, tmp_path: Path) -> None:
+    """A task may come to a worker before the end of its run, and begin after it."""
+    options = PLAIN._replace(run=uuid.uuid4().hex)
+    task = Task(0, tmp_path / 'none', tmp_path / 'out' / 'none', PARAMETERS, options)
+    with Client(cluster, set_as_default=False) as client:
+        client.run(_stop, options.run)
+        ended = client.submit(_on_worker, task, pure=False).result()
+    assert ended.error == f'{task.bag}: {STOPPED}'  # not that there is no such bag
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize('address', ['tcp://127.0.0.1:1', 'nonsense', 'foo://x', ''])

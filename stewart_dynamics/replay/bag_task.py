@@ -27,6 +27,8 @@ from stewart_dynamics.reporting.results_folder import REPORT_PAGE
 # Interval of progress reports, within one computer and on a cluster [s].
 LOCAL_INTERVAL, CLUSTER_INTERVAL = 0.1, 1.0
 
+STOPPED = 'the run was stopped'
+
 
 class Ended(NamedTuple):
     """The outcome of one bag."""
@@ -70,7 +72,7 @@ def replay_task(task: Task, progress: Callable[[int, int], None]) -> Ended:
     except (StewartError, OSError) as exc:
         why = f'{exc}'
     except Cancelled:
-        why = 'the run was stopped'
+        why = STOPPED
     except Exception as exc:  # an error in one bag does not stop the others
         why = unexpected(exc)
     else:

@@ -16,7 +16,8 @@ from typing import Any
 
 from stewart_dynamics.errors import one_line, StewartError
 from stewart_dynamics.replay.bag_task import (
-    At, Cancelled, CLUSTER_INTERVAL, counted, Ended, failed, finished, replay_task, Replayed, Task)
+    At, Cancelled, CLUSTER_INTERVAL, counted, Ended, failed, finished, replay_task, Replayed,
+    STOPPED, Task)
 
 # How long workers may take to remove partial results of a cancelled run [s].
 _PATIENCE = 20.0
@@ -118,6 +119,8 @@ def _on_worker(task: Task) -> Ended:
 
     _in_work.add((run, task.number))
     try:
+        if run in _cancelled:  # after _in_work.add: _stop cancels first, then looks at _in_work
+            return failed(task, STOPPED)
         return replay_task(task, progress)
     finally:
         _in_work.discard((run, task.number))
