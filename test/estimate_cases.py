@@ -5,7 +5,7 @@
 Recordings that judge the estimates of identification and payload.
 
 True hexapods are drawn from ``uncertainty.*`` of the parameter file, their motions and efforts are
-those of ``independent_hexapod`` and ``cranks_by_power``, and sensors add noise, quantization,
+those of ``independent_hexapod`` and ``independent_cranks``, and sensors add noise, quantization,
 jitter and delay.
 """
 
@@ -16,7 +16,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import cranks_by_power
+from independent_cranks import CrankBodies, cranks
 from independent_hexapod import Controlled, Legs, moving
 import numpy as np
 from numpy.typing import NDArray
@@ -71,10 +71,16 @@ class Case(NamedTuple):
             effort=sensors.effort * self.reach, coloured=sensors.coloured * self.reach)
 
 
+def moving_cranks(p: Parameters, motion: Motion) -> Legs:
+    """Return angles [rad], speeds [rad/s] and torques [N m] of the cranks of a hexapod."""
+    found = cranks(p, motion)
+    return Legs(found.angles, found.speeds, found.torques)
+
+
 CRANKS = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
 CASES = {
     'telescopic': Case(GIVEN, moving, HOME),
-    'crank': Case(CRANKS, cranks_by_power.moving, np.array([0.0, 0.0, 0.648, 0.0, 0.0, 0.0]),
+    'crank': Case(CRANKS, moving_cranks, np.array([0.0, 0.0, 0.648, 0.0, 0.0, 0.0]),
                   1.0, float(CRANKS['legs.crank.length'][0]))}
 
 
@@ -130,11 +136,11 @@ def _of_pistons(p: Parameters) -> dict[str, float]:
 def _of_cranks(p: Parameters) -> dict[str, float]:
     """Return the values of cranks and rods, and the sums of them that torques show."""
     found = {}
-    bodies, rotors = cranks_by_power.CrankBodies.of(p), p['actuator.reflected_inertia']
+    bodies, rotors = CrankBodies.of(p), p['actuator.reflected_inertia']
     for leg, joint in enumerate(p['joints']):
         mass, size = p['legs.crank.mass'][leg], p['legs.crank.length'][leg]
         x, y, _ = bodies.centers[leg]
-        about = bodies.inertias[leg] + mass * (x ** 2 + y ** 2)
+        about = bodies.inertias[leg, 2, 2] + mass * (x ** 2 + y ** 2)
         rod, length = p['legs.rod.mass'][leg], p['legs.rod.length'][leg]
         part, turning = bodies.rod_centers[leg] / length, bodies.rod_inertias[leg] / length ** 2
         end = rod * (1.0 - part) ** 2 + turning
@@ -189,7 +195,7 @@ def drawn(seed: int, given: Parameters = GIVEN) -> Truth:
         reflected: p[reflected] * relative('reflected_mass', 6),
         **{f'actuator.{kind}_friction': p[f'actuator.{kind}_friction'] * random.uniform(
             0.3, 2.0, 6) for kind in ('viscous', 'coulomb')}}
-    of_rods = cranks_by_power.CrankBodies.of(p) if kind.name == 'crank' else None
+    of_rods = CrankBodies.of(p) if kind.name == 'crank' else None
     for part in kind.bodies:
         for name in ('mass', 'center_of_mass', 'inertia'):
             value = p[f'legs.{part}.{name}']

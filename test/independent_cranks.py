@@ -8,7 +8,7 @@ Newton's and Euler's laws, body by body: the moments about the end of a crank gi
 each rod, the platform the forces along them, the rods the forces on the cranks, and these the
 torques of the shafts. Only Parameters and Motion, which carry the numbers, are the package's; the
 base is at rest. ``test_independent_limits`` compares this with the 13 bodies and 78 unknowns of
-``crank_newton_euler``.
+``crank_newton_euler``, and with this package.
 """
 
 from __future__ import annotations
@@ -33,6 +33,25 @@ class Cranks(NamedTuple):
     accelerations: Array  # [rad/s^2]
     torques: Array  # at the shafts [N m]
     rod_forces: Array  # along the rods, the larger one of both ends [N]
+
+
+class CrankBodies(NamedTuple):
+    """Cranks and rods of a parameter file."""
+
+    centers: Array  # of the cranks, from their axes in [e n u] (6, 3) [m]
+    inertias: Array  # of the cranks, about their centers in [e n u] (6, 3, 3) [kg m^2]
+    rod_centers: Array  # from the ends of the cranks (6,) [m]
+    rod_inertias: Array  # (6,) [kg m^2]
+
+    @classmethod
+    def of(cls, p: Parameters) -> CrankBodies:
+        """Return the bodies of a file; a rod is uniform where the file says no more."""
+        rod, mass = _six(p['legs.rod.length']), _six(p['legs.rod.mass'])
+        center, inertia = p['legs.rod.center_of_mass'], p['legs.rod.inertia']
+        return cls(_vectors(p['legs.crank.center_of_mass'], 0, 3),
+                   _tensors(_vectors(p['legs.crank.inertia'], 5, 6)),
+                   0.5 * rod if center is None else _six(center),
+                   mass * rod ** 2 / 12.0 if inertia is None else _six(inertia))
 
 
 def _six(value: Any) -> Array:
@@ -119,10 +138,8 @@ def _cranks(p: Parameters, motion: Motion) -> Cranks:
 
     # The rod: its moments about the end of the crank give the force across it on the platform.
     gravity = np.asarray(p.gravity, dtype=float)
-    mass = _six(p['legs.rod.mass'])
-    given_center, given_inertia = p['legs.rod.center_of_mass'], p['legs.rod.inertia']
-    at = 0.5 * rod if given_center is None else _six(given_center)
-    inertia = mass * rod ** 2 / 12.0 if given_inertia is None else _six(given_inertia)
+    mass, bodies = _six(p['legs.rod.mass']), CrankBodies.of(p)
+    at, inertia = bodies.rod_centers, bodies.rod_inertias
     felt = mass[:, None] * (end_acceleration + at[:, None] * turn - gravity)
     moment = np.cross(at[:, None] * d, felt) + inertia[:, None] * np.cross(d, turn)
     across = -np.cross(moment / rod[:, None], d)
@@ -147,15 +164,13 @@ def _cranks(p: Parameters, motion: Motion) -> Cranks:
     on_rod = on_platform + felt  # by the crank
 
     # The crank, about the axis of its motor.
-    centers = _vectors(p['legs.crank.center_of_mass'], 0, 3)
-    tensors = _tensors(_vectors(p['legs.crank.inertia'], 5, 6))
     axes = np.stack([e, n, np.broadcast_to(u, e.shape)], axis=-1)
-    arm_c = np.einsum('nkij,kj->nki', axes, centers)
+    arm_c = np.einsum('nkij,kj->nki', axes, bodies.centers)
     omega = speed[..., None] * u
     of_arm = np.cross(drive[..., None] * u, arm_c) + np.cross(omega, np.cross(omega, arm_c))
     crank_mass = _six(p['legs.crank.mass'])
     crank_force = crank_mass[:, None] * (of_arm - gravity)
-    shaft = (tensors[:, 2, 2] * drive + _dot(u, np.cross(arm_c, crank_force))
+    shaft = (bodies.inertias[:, 2, 2] * drive + _dot(u, np.cross(arm_c, crank_force))
              + _dot(u, np.cross(size[:, None] * e, on_rod)))
     slow = _six(p['actuator.coulomb_velocity'])
     torque = (shaft + _six(p['actuator.reflected_inertia']) * drive

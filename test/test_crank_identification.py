@@ -16,10 +16,9 @@ from typing import Any
 from crank_machines import random_machine
 from crank_newton_euler import CrankHexapod, inverse_dynamics, machine_of, State
 from crank_platforms import parameters_of, six
-import cranks_by_power
 from estimate_cases import (
-    CASES, CRANKS, drawn, identified as judged, Outcome, payload, recorded as recorded_of, rich,
-    SENSORS, Sines, Truth)
+    CASES, CRANKS, drawn, identified as judged, moving_cranks, Outcome, payload,
+    recorded as recorded_of, rich, SENSORS, Sines, Truth)
 from legs_of_all_kinds import random_hexapod
 import numpy as np
 import pytest
@@ -143,7 +142,7 @@ def test_a_bag_shows_rotors_cranks_and_friction(run: Callable[..., Any], tmp_pat
         'actuator.coulomb_friction'}
     motion = CASES['crank'].placed(rich(rng(99)))(np.arange(0.0, 10.0, 0.05))
     torques, by_file, by_found = (
-        cranks_by_power.moving(p, motion).forces for p in (TRUE.parameters, GIVEN, found))
+        moving_cranks(p, motion).forces for p in (TRUE.parameters, GIVEN, found))
     assert relative(by_file, torques) > 0.05
     assert relative(by_found, torques) < 0.01
     comment, = (line for line in written.read_text().splitlines() if 'reflected_inertia:' in line)

@@ -5,10 +5,6 @@
 
 from __future__ import annotations
 
-from crank_machines import random_machine, random_state
-from crank_newton_euler import inverse_dynamics
-from crank_platforms import motion_of, parameters_of
-import cranks_by_power
 from estimate_cases import AXES, CRANKS, drawn, legs_of, MOTIONS, SLOW, stopping
 from independent_hexapod import Controlled, moving
 import numpy as np
@@ -26,27 +22,6 @@ def test_forces_lengths_and_rates_are_those_of_this_package(seed: int) -> None:
     legs, result = moving(p, motion), StewartPlatform(p).inverse_dynamics(motion)
     for found, expected in zip(legs, (result.lengths, result.rates, result.forces), strict=True):
         assert relative(found, expected) < 1e-12
-
-
-@pytest.mark.parametrize('seed', range(4))
-def test_cranks_are_those_of_free_bodies_and_of_this_package(seed: int) -> None:
-    """Centers of mass beside all lines, both branches, axes of any heading, tilted gravity."""
-    random = rng(seed)
-    machine = random_machine(random, 1.0)
-    p, motions = parameters_of(machine), []
-    for _ in range(6):
-        state = random_state(machine, random, moving_base=False)
-        truth = inverse_dynamics(machine, state)
-        at = motion_of(state)
-        loaded = StewartPlatform(p).inverse_dynamics(at, state.wrench).torques
-        without = StewartPlatform(p).inverse_dynamics(at).torques
-        legs = cranks_by_power.moving(p, Motion.of_rows(at.rows[None]))
-        assert relative(legs.rates[0], truth.rates) < 1e-11
-        assert relative(legs.forces[0] + loaded - without, truth.torques) < 1e-11
-        motions.append(at.rows)
-    rows = Motion.of_rows(np.array(motions))
-    assert relative(cranks_by_power.moving(p, rows).forces,
-                    StewartPlatform(p).inverse_dynamics(rows).torques) < 1e-11
 
 
 @pytest.mark.parametrize('seed', range(2))
