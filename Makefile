@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-gpu bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
   bench-replay bench-response clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship demo-tune docs docs-site export-demo installed \
-  lint lint-flake8 lint-layers lint-mypy lint-pep257 lint-ruff test test-gpu tools wheels
+  lint lint-flake8 lint-layers lint-mypy lint-pep257 lint-ruff pytest test test-gpu test-release tools wheels
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -82,19 +82,27 @@ INSTALLED := $(VENV)/installed-$(ROS)
 # And with the tools of tests, linters, benchmarks and pages.
 TOOLS := $(VENV)/tools-$(ROS)
 
-# More processes than cores: tests with ROS wait half of the time. One module, one process. Linters
-# look at the pinned environment alone.
-test: $(if $(VERSIONS),$(TOOLS),lint)
-	$(VENV)/bin/python -m pytest --numprocesses $(TESTERS) --dist loadfile --no-loadscope-reorder
+# Without the tests that take seconds, one more of a kind or of the whole (marker `slow`): those are left to
+# `make test-release`. Linters, which look at the pinned environment alone, run beside.
+test: SELECTED := -m 'not slow'
+test test-release: $(TOOLS)
+	@$(MAKE) --no-print-directory --jobs 2 pytest $(if $(VERSIONS),,$(LINTERS)) SELECTED="$(SELECTED)"
+
+# More processes than cores: one half of them waits for ROS, the other half computes. One module, one
+# process. Tests that run make are no part of this one.
+pytest: $(TOOLS)
+	env -u MAKEFLAGS $(VENV)/bin/python -m pytest --numprocesses $(TESTERS) --dist loadfile --no-loadscope-reorder $(SELECTED)
 
 # On a computer with a GPU; CuPy is of no use to the others. The figures: make bench-gpu.
 test-gpu: $(TOOLS)
 	@$(VENV)/bin/python -c 'import cupy' 2> /dev/null || $(PIP) install --requirement requirements-gpu.txt
 	$(VENV)/bin/python -m pytest test/test_gpu_on_device.py test/test_gpu.py test/test_hexapod_env.py
 
+LINTERS := lint-mypy lint-flake8 lint-pep257 lint-ruff lint-layers
+
 # Beside one another: mypy and flake8 take nearly the same time.
 lint: $(TOOLS)
-	@$(MAKE) --no-print-directory --jobs --output-sync lint-mypy lint-flake8 lint-pep257 lint-ruff lint-layers
+	@$(MAKE) --no-print-directory --jobs --output-sync $(LINTERS)
 
 lint-flake8: $(TOOLS)
 	$(VENV)/bin/python -m flake8

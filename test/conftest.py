@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing, ExitStack
 import gc
@@ -25,6 +24,9 @@ from snapshot import Snapshot
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
     from running import DynamicsNode, NodeProcess, Peer
+    from xdist.remote import Producer
+    from xdist.scheduler.protocol import Scheduling
+    from xdist.workermanage import WorkerController
 
 # Before numpy is imported, in this process and those that it starts: with matrices as small as
 # these, waiting threads cost as much again, and other processes need the cores.
@@ -117,20 +119,34 @@ def skip_without_ros(report: pytest.CollectReport | pytest.TestReport,
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests with ROS; put modules with slow tests first, each second one with ROS."""
+    """Mark the tests with ROS; put their modules first, and slow ones at both ends."""
     for item in items:
         if 'ros_environment' in getattr(item, 'fixturenames', ()):
             item.add_marker('ros')
     having = {mark: {item.path for item in items if item.get_closest_marker(mark)}
               for mark in ('ros', 'slow')}
-    # Those with ROS wait half of the time: meanwhile the others compute.
-    numbers: Counter[tuple[bool, bool]] = Counter()
-    places = {}
-    for path in dict.fromkeys(item.path for item in items):
-        quick, alone = path not in having['slow'], path not in having['ros']
-        places[path] = quick, numbers[quick, alone], alone
-        numbers[quick, alone] += 1
-    items.sort(key=lambda item: places[item.path])
+    items.sort(key=lambda item: (item.path not in having['ros'], (
+        item.path in having['ros']) != (item.path in having['slow'])))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Scheduling | None:
+    """
+    Give every second process the modules from the end, which compute.
+
+    The others wait for ROS half of the time: meanwhile these have the processors.
+    """
+    if config.getvalue('dist') != 'loadfile':
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Pools(LoadFileScheduling):
+        def _assign_work_unit(self, node: WorkerController) -> None:
+            if self.nodes.index(node) % 2:
+                self.workqueue.move_to_end(next(reversed(self.workqueue)), last=False)
+            super()._assign_work_unit(node)
+
+    return Pools(config, log)
 
 
 @pytest.fixture(scope='session', autouse=True)

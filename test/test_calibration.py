@@ -23,8 +23,6 @@ from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.drives.turning_screws import screw_constants, universal_axes
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 
-pytestmark = pytest.mark.slow
-
 PROGRAM = 'stewart_calibrate'
 
 # M. J. Nategh, M. M. Agheli, "A total solution to kinematic calibration of hexapod machine tools
@@ -492,6 +490,7 @@ def test_large_play_is_no_outlier_and_no_lack_of_motion(side: str) -> None:
     assert not found.outliers and found.lack_of_fit[0].what == 'play'
 
 
+@pytest.mark.slow
 def test_noise_of_any_kind_is_no_lack_of_fit() -> None:
     """Normal, heavy tails, a uniform distribution; single poses, and each measured three times."""
     for seed in range(24):

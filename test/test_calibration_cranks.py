@@ -39,8 +39,6 @@ from stewart_dynamics.estimation.confidence_level import TWO_SIDED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from test_calibrate_command import write_bag
 
-pytestmark = pytest.mark.slow
-
 PROGRAM = 'stewart_calibrate'
 FILE = ROOT / 'config' / 'crank_platform.yaml'
 RIG = Parameters.from_yaml(FILE)
@@ -130,7 +128,8 @@ def test_all_numbers_are_found_without_noise() -> None:
 
 
 @pytest.mark.parametrize(('stage', 'zero', 'length'), [
-    (('zero',), 0.09, 0.0), (('zero', 'lengths'), 0.5, 0.004), (ALL, 1.2, 0.006)])
+    (('zero',), 0.09, 0.0), pytest.param(('zero', 'lengths'), 0.5, 0.004, marks=pytest.mark.slow),
+    pytest.param(ALL, 1.2, 0.006, marks=pytest.mark.slow)])
 def test_errors_and_intervals_of_a_stage(
         stage: tuple[str, ...], zero: float, length: float) -> None:
     """0.2 degrees and 0.3 % of a crank; errors [deg], and of L1 by a crank, not to be exceeded."""

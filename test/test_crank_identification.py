@@ -171,6 +171,7 @@ def by_newton_euler(machine: CrankHexapod, motion: Motion) -> tuple[Array, Array
     return angles, rates, torques
 
 
+@pytest.mark.slow
 def test_identified_numbers_give_the_torques_of_free_bodies() -> None:
     """The motion is not the recorded one; the file has other cranks, rotors and rods."""
     machine, path = on_rig()
@@ -194,6 +195,7 @@ def rig_line(machine: CrankHexapod) -> Array:
     return on_line
 
 
+@pytest.mark.slow
 def test_four_sums_of_the_masses_of_a_leg_act_on_a_base_at_rest() -> None:
     p, motion = random_hexapod('crank', 4, 400)
     platform, places = StewartPlatform(p), Places.of(CRANK)
@@ -292,7 +294,8 @@ def test_the_motion_of_angles_is_the_motion_they_come_from() -> None:
     np.testing.assert_allclose(rows[:, 18:], truth.rows[:, 18:], atol=1e-5)
 
 
-@pytest.mark.parametrize('option', ['--motor-torque', '--motor-current'])
+@pytest.mark.parametrize('option', [
+    '--motor-torque', pytest.param('--motor-current', marks=pytest.mark.slow)])
 def test_torques_and_currents_of_motors_show_the_same(
         run: Callable[..., Any], option: str) -> None:
     p = GIVEN.replaced(DRIVES)
@@ -306,6 +309,7 @@ def test_torques_and_currents_of_motors_show_the_same(
     assert low < 185.0 < high and high - low < 0.1 * 185.0
 
 
+@pytest.mark.slow
 def test_a_plate_is_identified() -> None:
     """The inertia of a disc without thickness is on the bound of possible inertias."""
     disc = {'platform.inertia': [24.0, 0.0, 0.0, 24.0, 0.0, 48.0]}
@@ -330,17 +334,20 @@ def swapped(given: Recorded) -> Recorded:
 
 
 @pytest.mark.parametrize(('change', 'named'), [
-    (lambda given: given._replace(efforts=-given.efforts),
-     r'opposite sign: \+ must drive the angle up'),
+    pytest.param(lambda given: given._replace(efforts=-given.efforts),
+                 r'opposite sign: \+ must drive the angle up', marks=pytest.mark.slow),
     (lambda given: given._replace(efforts=1e2 / 9.80665 * given.efforts),
      'likely kgf cm in place of N m'),
     (lambda given: given._replace(positions=np.degrees(given.positions)),
      r'the measured angles belong to no pose of this hexapod: they are -\d+\.?\d* to '
      r'\d+\.?\d* rad, and limits.angle_min and angle_max are -1.0472 and 1.0472 rad: likely the '
      'zero of the angles is wrong, or positions are in another unit'),
-    (swapped, 'positions and efforts of leg_2 and leg_3 look swapped'),
-    (lambda given: given._replace(positions=given.positions - 0.03),
-     'the zero of the angles looks wrong: another zero of the angles, (\\+1\\.\\d+ ){6}deg'),
+    pytest.param(swapped, 'positions and efforts of leg_2 and leg_3 look swapped',
+                 marks=pytest.mark.slow),
+    pytest.param(
+        lambda given: given._replace(positions=given.positions - 0.03),
+        'the zero of the angles looks wrong: another zero of the angles, (\\+1\\.\\d+ ){6}deg',
+        marks=pytest.mark.slow),
 ], ids=['sign', 'kgf cm', 'degrees', 'swapped', 'zero'])
 def test_likely_mistakes_are_named_and_nothing_is_written(
         run: Callable[..., Any], tmp_path: Path, change: Callable[[Recorded], Recorded],
@@ -352,6 +359,7 @@ def test_likely_mistakes_are_named_and_nothing_is_written(
     assert not (tmp_path / 'found').exists()
 
 
+@pytest.mark.slow
 def test_a_horn_on_the_next_tooth_is_the_cause_of_the_lack_of_fit() -> None:
     """14.4 degrees with 25 teeth, found from torques though no pose was measured."""
     given = recorded_of(Truth(CRANKS), 'rich', 5, SENSORS, 12.0, RATE)
@@ -366,6 +374,7 @@ def test_a_horn_on_the_next_tooth_is_the_cause_of_the_lack_of_fit() -> None:
     assert degrees is not None and float(degrees[1]) == pytest.approx(-14.4, abs=1.0)
 
 
+@pytest.mark.slow
 def test_rotors_far_from_the_file_are_the_cause_of_the_lack_of_fit() -> None:
     p = CRANKS.replaced({'uncertainty.reflected_mass': 0.02, 'uncertainty.effort_gain': 0.001})
     found = found_in(moved(6), p.replaced({
@@ -377,6 +386,7 @@ def test_rotors_far_from_the_file_are_the_cause_of_the_lack_of_fit() -> None:
                     found.lack_of_fit.text)
 
 
+@pytest.mark.slow
 def test_a_parameter_that_a_lack_of_fit_hides_is_no_combination_by_itself() -> None:
     """With the file's 10 % for rotors that are 40 % heavier, the widened intervals say nothing."""
     kinds = 'friction', 'reflected_inertia'
@@ -393,7 +403,7 @@ def test_a_parameter_that_a_lack_of_fit_hides_is_no_combination_by_itself() -> N
             each['coefficients'], each['parameters'], strict=True)) * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('seed', [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))])
 def test_intervals_contain_hexapods_that_are_drawn(seed: int) -> None:
     """See benchmarks/interval_coverage.py --legs crank for 200 of them."""
     found: Outcome = judged([recorded_of(drawn(seed, CRANKS), 'rich', seed, rate=RATE)],

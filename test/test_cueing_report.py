@@ -29,8 +29,6 @@ from stewart_dynamics.messages.setpoint import ImuWriter
 sys.path.insert(0, str(ROOT / 'examples'))
 from town_drive import drive, GRAVITY, write_csv  # noqa: E402, I100, I202
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def town(tmp_path: Path) -> Path:
@@ -80,6 +78,7 @@ def test_report_of_a_drive(town: Path, tmp_path: Path) -> None:
     assert datasheet['motion']['possible'] and datasheet['motion']['samples'] == len(times)
 
 
+@pytest.mark.slow
 def test_tuned_gains_use_the_machine(town: Path, tmp_path: Path) -> None:
     """90 % of a limit, and no more; each gain has its reason; the file has them."""
     folder = tmp_path / 'out'

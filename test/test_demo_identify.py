@@ -39,6 +39,7 @@ def states_of(parameters: Parameters, motion: Motion, stamps: np.ndarray) -> lis
         stamps, result.lengths - parameters['geometry.zero_length'], result.rates, result.forces)]
 
 
+@pytest.mark.slow
 def test_the_demo_identifies_the_true_parameters(demo: ModuleType, tmp_path: Path) -> None:
     given = Parameters.from_yaml(PLATFORM)
     true = given.replaced(demo.TRUE)

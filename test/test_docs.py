@@ -83,6 +83,7 @@ def test_every_page_is_on_the_site(site: dict[str, Page]) -> None:
         assert f'results/{page.stem}.html' in site['performance.html'].links
 
 
+@pytest.mark.slow
 def test_links_of_the_site_lead_to_pages_and_anchors(site: dict[str, Page]) -> None:
     checked = 0
     of_path = {page.path: page for page in site.values()}
@@ -103,6 +104,7 @@ def test_links_of_the_site_lead_to_pages_and_anchors(site: dict[str, Page]) -> N
     assert checked > 500
 
 
+@pytest.mark.slow
 def test_the_site_needs_no_network(site: dict[str, Page]) -> None:
     for page in site.values():
         assert page.loaded
@@ -113,6 +115,7 @@ def test_the_site_needs_no_network(site: dict[str, Page]) -> None:
             assert parts.scheme or (page.path.parent / unquote(parts.path)).is_file(), link
 
 
+@pytest.mark.slow
 def test_a_phone_shows_headings_and_tables_of_texts_whole(
         site: dict[str, Page], browser: Browser) -> None:
     page = browser.new_page(viewport={'width': 390, 'height': 844})
@@ -132,6 +135,7 @@ def test_a_phone_shows_headings_and_tables_of_texts_whole(
     page.close()
 
 
+@pytest.mark.slow
 def test_the_api_reference_has_every_public_name(site: dict[str, Page]) -> None:
     anchors = site['api.html'].anchors
     assert stewart_dynamics.__all__

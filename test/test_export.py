@@ -383,7 +383,9 @@ def exported_cranks(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @needs_compiler
-@pytest.mark.parametrize('language', [['-std=c99'], ['-xc++', '-std=c++17']], ids=['C', 'C++'])
+@pytest.mark.parametrize('language', [
+    pytest.param(['-std=c99'], id='C'),
+    pytest.param(['-xc++', '-std=c++17'], id='C++', marks=pytest.mark.slow)])
 @pytest.mark.parametrize('compiler', COMPILERS)
 def test_golden_vectors_are_met_and_nothing_warns(
         exported: Path, exported_cranks: Path, tmp_path: Path, compiler: str,
@@ -564,6 +566,7 @@ def test_golden_vectors_are_not_met_by_another_hexapod(exported: Path, tmp_path:
 
 
 @needs_compiler
+@pytest.mark.slow
 def test_golden_vectors_and_bad_inputs_are_clean_under_sanitizers(
         exported: Path, exported_cranks: Path, tmp_path: Path) -> None:
     options: list[str | Path] = [
@@ -600,7 +603,8 @@ def test_32_bit_targets_compile(exported: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif('gcc' not in COMPILERS, reason='needs gcc')
-@pytest.mark.parametrize('level', ['-O0', '-O2', '-O3'])
+@pytest.mark.parametrize('level', [
+    '-O0', *(pytest.param(level, marks=pytest.mark.slow) for level in ('-O2', '-O3'))])
 def test_stack_is_bounded_and_nothing_recurses(tmp_path: Path, level: str) -> None:
     """The deepest chain of calls, by gcc's call graph; it needs no globals and no allocation."""
     made = tmp_path / 'source.o'
@@ -658,6 +662,7 @@ def test_tolerances_are_those_of_the_library() -> None:
 
 
 @needs_compiler
+@pytest.mark.slow
 def test_cmake_builds_tests_and_installs(exported: Path, tmp_path: Path) -> None:
     cmake = shutil.which('cmake', path=os.pathsep.join(
         [str(Path(sys.executable).parent), os.environ['PATH']]))

@@ -215,8 +215,8 @@ def check_only_the_long_one_failed(
 
 # On this computer
 
-@pytest.mark.parametrize('where', ['here', 'processes', 'cluster'])
-@pytest.mark.slow
+@pytest.mark.parametrize('where', [
+    'processes', *(pytest.param(where, marks=pytest.mark.slow) for where in ('here', 'cluster'))])
 def test_every_bag_is_replayed_once_with_its_progress(
         bags: Path, tmp_path: Path, where: str, request: pytest.FixtureRequest,
         monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
@@ -673,6 +673,7 @@ def test_a_lost_cluster_is_reported_for_each_bag(
     assert 'Traceback' not in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_worker_begins_no_bag_of_a_run_that_was_stopped(
         cluster: LocalCluster, tmp_path: Path) -> None:
     """A task may come to a worker before the end of its run, and begin after it."""

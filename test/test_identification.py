@@ -27,8 +27,6 @@ from stewart_dynamics.mechanics.drives.motors import motor_ratio
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-pytestmark = pytest.mark.slow
-
 PROGRAM = 'stewart_identify'
 Array = NDArray[np.float64]
 
@@ -138,6 +136,7 @@ def test_the_report_draws_the_leg_with_the_largest_residual(
     page.close()
 
 
+@pytest.mark.slow
 def test_brakes_at_the_start_do_not_widen_the_intervals(identified: Callable[..., Any],
                                                         tmp_path: Path) -> None:
     def with_brakes(given: Recorded) -> Recorded:
@@ -308,13 +307,16 @@ def _swapped(given: Recorded) -> Recorded:
 
 @pytest.mark.parametrize(('change', 'named', 'options'), [
     (lambda given: given._replace(efforts=-given.efforts), r'opposite sign: \+ must push', ()),
-    (lambda given: given._replace(efforts=1e-3 * given.efforts), 'likely kN in place of N',
-     WITH_TILT),
-    (lambda given: given._replace(efforts=given.efforts * 0.02 / (2.0 * np.pi)),
-     'likely torques of the motors', ()),
-    (_swapped, 'positions and efforts of leg_2 and leg_3 look swapped', WITH_TILT),
-    (lambda given: given._replace(positions=given.positions - 0.02),
-     r'geometry.zero_length looks wrong: another geometry.zero_length, (\+1[89]\S* ){6}mm', ()),
+    pytest.param(lambda given: given._replace(efforts=1e-3 * given.efforts),
+                 'likely kN in place of N', WITH_TILT, marks=pytest.mark.slow),
+    pytest.param(lambda given: given._replace(efforts=given.efforts * 0.02 / (2.0 * np.pi)),
+                 'likely torques of the motors', (), marks=pytest.mark.slow),
+    pytest.param(_swapped, 'positions and efforts of leg_2 and leg_3 look swapped', WITH_TILT,
+                 marks=pytest.mark.slow),
+    pytest.param(
+        lambda given: given._replace(positions=given.positions - 0.02),
+        r'geometry.zero_length looks wrong: another geometry.zero_length, (\+1[89]\S* ){6}mm', (),
+        marks=pytest.mark.slow),
     (lambda given: given._replace(positions=1e3 * given.positions),
      'lengths belong to no pose of this hexapod', ()),
 ], ids=['sign', 'kN', 'torque', 'swapped', 'zero length', 'mm'])
@@ -334,7 +336,8 @@ CONSTANT = np.array([0.3, 0.35, 0.4, 0.45, 0.5, 0.55])
 
 
 @pytest.mark.parametrize(('option', 'per_newton', 'given', 'needed'), [
-    ('--motor-torque', 0.01 / (2.0 * np.pi), {}, {'actuator.screw_lead': 0.01}),
+    pytest.param('--motor-torque', 0.01 / (2.0 * np.pi), {}, {'actuator.screw_lead': 0.01},
+                 marks=pytest.mark.slow),
     ('--motor-current', 0.01 / (2.0 * np.pi * 3.0) / CONSTANT,
      {'actuator.screw_lead': 0.01, 'drive.gear_ratio': 3.0}, {'drive.torque_constant': CONSTANT})])
 def test_efforts_of_motors_need_the_drive(
@@ -369,6 +372,7 @@ def test_a_table_is_rejected_with_the_way_to_a_bag(
     assert 'docs/identify_from_bags.md' in err
 
 
+@pytest.mark.slow
 def test_forces_given_as_torques_of_motors_are_named(
         identified: Callable[..., Any], tmp_path: Path, snapshot: Snapshot) -> None:
     """A few hundred times too large, they all are beyond limits.force_max, where it is given."""
@@ -382,6 +386,7 @@ def test_forces_given_as_torques_of_motors_are_named(
         snapshot(err)
 
 
+@pytest.mark.slow
 def test_losses_of_drives_are_no_mass_and_no_friction(
         identified: Callable[..., Any], tmp_path: Path) -> None:
     p = GIVEN.replaced({
@@ -406,7 +411,8 @@ def test_losses_of_drives_are_no_mass_and_no_friction(
     assert values_of(result)['platform.mass'] == pytest.approx(180.0, rel=0.003)
 
 
-@pytest.mark.parametrize('frequency', [0.2, 0.5, 1.0])
+@pytest.mark.parametrize('frequency', [
+    0.2, *(pytest.param(each, marks=pytest.mark.slow) for each in (0.5, 1.0))])
 @pytest.mark.parametrize('factor', [1.0, -1.0])
 def test_opposite_efforts_in_heave_are_not_taken_for_a_delay(
         identified: Callable[..., Any], frequency: float, factor: float,

@@ -178,7 +178,6 @@ def test_a_page_is_opened_for_who_has_a_screen_and_a_terminal(
     os.close(output)
 
 
-@pytest.mark.slow
 def test_the_same_run_gives_the_same_bits(run: Callable[..., Any]) -> None:
     first, second = run(True, 1.3), run(True, 1.3, number=1)
     for one, other in zip(first.errors, second.errors, strict=True):
@@ -254,6 +253,7 @@ def controlled(peer: Peer, folder: Path, timeout: float, platform: Path = PLATFO
             peer.writer('/stewart_dynamics/leg_states', JointState))
 
 
+@pytest.mark.slow
 def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
         peer: Peer, tmp_path: Path) -> None:
     """The plant waits for each command, so that the result is that of a fast computer."""
@@ -310,6 +310,7 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
         program.kill()
 
 
+@pytest.mark.slow
 def test_after_a_gap_the_controller_returns_slowly_and_within_the_limits_of_force(
         peer: Peer, tmp_path: Path) -> None:
     """The desired lengths have gone on by 150 mm: stiffness times distance is 60 kN."""

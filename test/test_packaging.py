@@ -195,6 +195,7 @@ def test_colcon_puts_executables_where_ros2_run_looks(install: Path) -> None:
     check_share(install / NAME / 'share')
 
 
+@pytest.mark.slow
 def test_colcon_result_runs(install: Path) -> None:
     """The executables are those of the install space and not of another installation."""
     script = install / NAME / 'lib' / NAME / 'stewart_replay'
