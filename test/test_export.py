@@ -285,7 +285,6 @@ def limited(random: np.random.Generator) -> Parameters:
     return p
 
 
-@pytest.mark.slow
 def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
     """Warning with hysteresis, limits, jumps, clipped and suppressed forces, and motors."""
     random, seen = rng(2), set()
