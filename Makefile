@@ -200,6 +200,8 @@ bags: $(INSTALLED)
 docs: $(TOOLS)
 	$(VENV)/bin/python docs/figures/errata.py
 	$(VENV)/bin/python docs/figures/draw.py
+	$(VENV)/bin/python docs/figures/moving.py
+	$(VENV)/bin/python docs/figures/badges.py
 	$(VENV)/bin/python docs/figures/hexapod.py
 	$(VENV)/bin/python docs/figures/cranks.py
 	$(VENV)/bin/python docs/figures/tables.py

@@ -298,7 +298,7 @@ def demonstration(command: str) -> Iterator[None]:
 @contextmanager
 def live_view() -> Iterator[None]:
     """Run examples/live_view.py, print its address, and open it where there is a browser."""
-    # Of its errors the address is not one: without the view, the demo goes on.
+    # Where it fails it says why on stderr, and the demo goes on without it.
     view = subprocess.Popen([sys.executable, ROOT / 'examples' / 'live_view.py', '--port', '0'],
                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
     try:
