@@ -204,8 +204,8 @@ def conclusion(runs: Sequence[Run], kind: LegKind) -> str:
     alone, forward, heavier_alone, heavier = (
         f'{run.errors.peak["position"] / 1e3:.2g} mm' for run in runs)
     return (f'With the {kind.effort.field} of the node the platform stays within {forward} of its '
-            f'motion, without them within {alone};\nwith a {payload_name(runs[-1].payload)} that '
-            f'the node does not know within {heavier}, without within {heavier_alone}.')
+            f'motion, without them within {alone};\nwith {100.0 * (runs[-1].payload - 1.0):.0f} % '
+            f'more payload than the node knows, within {heavier} and {heavier_alone}.')
 
 
 def _peak(value: float) -> str:

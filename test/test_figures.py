@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import importlib
-from pathlib import Path
 import re
 from types import ModuleType
 from typing import TYPE_CHECKING
