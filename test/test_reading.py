@@ -275,11 +275,14 @@ def test_an_open_urdf_whose_loops_gazebo_closes_is_read(tmp_path):
                                   {'name': f'{leg}_ball', 'type': 'ball'})
             ET.SubElement(joint, 'parent').text = f'{leg}_piston'
             ET.SubElement(joint, 'child').text = f'{leg}_platform_joint'
+            dynamics = ET.SubElement(ET.SubElement(joint, 'axis'), 'dynamics')
+            ET.SubElement(dynamics, 'damping').text = '3'
         return ET.tostring(root, encoding='unicode')
 
-    found = read_hexapod(written(p, 'urdf', tmp_path, closed_by_gazebo)).parameters
+    found = read_hexapod(written(p, 'urdf', tmp_path, closed_by_gazebo))
     for name in ('geometry.base_joints', 'geometry.platform_joints', 'platform.inertia'):
-        assert found[name] == pytest.approx(p[name], abs=1e-12), name
+        assert found.parameters[name] == pytest.approx(p[name], abs=1e-12), name
+    assert 'each leg: damping 3 of its joints at the platform is left out' in found.remarks
 
 
 def test_an_open_urdf_in_which_one_leg_carries_the_platform_is_read_and_reported(tmp_path):
@@ -357,6 +360,7 @@ def test_a_start_outside_the_limits_is_reported(tmp_path):
     '</link></model></sdf>',
     '<sdf version="1.9"><model name="m"><joint name="j" type="fixed"><parent>a</parent></joint>'
     '</model></sdf>',
+    '<sdf version="1.9"><world name="w"><include><uri>model://six</uri></include></world></sdf>',
 ], ids=itertools.count())
 def test_a_file_without_a_hexapod_is_rejected_in_one_line(text, tmp_path, snapshot):
     path = tmp_path / 'file.xml'

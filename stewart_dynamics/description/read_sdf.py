@@ -31,7 +31,9 @@ def read_sdf(root: ET.Element, source: Path) -> Mechanism:
     model = max(root.iter('model'), default=None, key=lambda each: sum(
         joint.get('type') == 'prismatic' for joint in each.findall('joint')))
     if model is None:
-        raise DescriptionError(f'{source}: no model')
+        included = root.find('.//include') is not None
+        raise DescriptionError(f'{source}: no model' + (
+            ', but included ones: read the file of the model' if included else ''))
     reader = _SdfModel(model, _version(root), source)
     joints = [reader.placed_joint(joint) for joint in model.findall('joint')]
     fixed = [reader.fixed(plugin) for plugin in model.findall('plugin')

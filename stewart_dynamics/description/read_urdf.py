@@ -8,8 +8,7 @@ URDF as a mechanism.
 Elements ``constraint``, ``joint`` in a block ``gazebo``, the block of stewart_describe, a file
 beside it (``loops``), or names of frames (onshape-to-robot) close its loops.
 
-MuJoCo's own reader of URDF has none of these, nor limits of rates and names of fixed joints, and
-rejects files of CAD programs (docs/description.md): it is not used.
+MuJoCo's reader of URDF has none of these (docs/description.md).
 """
 
 from __future__ import annotations
