@@ -207,6 +207,18 @@ def test_the_usd_of_another_tool_is_read_in_its_units(units: str, tmp_path: Path
     assert p['actuator.reflected_mass'] == pytest.approx(0.0)
 
 
+def test_a_mass_without_its_schema_has_no_inertia(tmp_path: Path) -> None:
+    """An attribute that no schema declares has no default."""
+    stage = opened(FILE)
+    for prim in stage.Traverse():
+        for name in ('centerOfMass', 'diagonalInertia', 'principalAxes'):
+            prim.RemoveProperty(f'physics:{name}')
+        prim.RemoveAPI(UsdPhysics.MassAPI)
+    stage.Export(str(tmp_path / 'hexapod.usda'))
+    with pytest.raises(StewartError, match='platform.inertia: .* must be positive definite'):
+        read_hexapod(tmp_path / 'hexapod.usda')
+
+
 @pytest.mark.parametrize(('data', 'why'), [
     (b'#usda 1.0\ndef Xform "a" {', 'usd-core: '), (b'PXR-USDC\0\0', 'usd-core: '),
     (b'#usda 1.0\n', 'no hexapod'), (b'', 'usd-core: '), (None, 'cannot be read')])

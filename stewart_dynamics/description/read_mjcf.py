@@ -111,7 +111,7 @@ class _Model:
         return 0.0 if values is None else float(values[n].item())
 
     def _grows(self, field: str, n: int) -> bool:
-        """Return whether a joint has terms with powers; versions before 3.16 have none."""
+        """Return whether a joint has terms with powers; False in versions without them."""
         return bool(np.any(getattr(self._model, field, np.zeros(n + 1))[n]))
 
     def _take_options(self) -> None:

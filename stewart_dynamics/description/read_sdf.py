@@ -85,7 +85,7 @@ class _SdfModel(XmlModel):
                                self.pose(each))
 
     def body(self, link: ET.Element) -> MechanismBody:
-        """Return a link as a body, with what acts on it."""
+        """Return a link as a body, with the forces on it that have no parameter."""
         made, inertial = super().body(link), link.find('inertial')
         if link.findtext('gravity', '').strip() in _OFF:
             made.weightless = 'gravity switched off'

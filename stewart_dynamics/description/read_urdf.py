@@ -8,7 +8,7 @@ URDF as a mechanism.
 Elements ``constraint``, ``joint`` in a block ``gazebo``, the block of stewart_describe, a file
 beside it (``loops``), or names of frames (onshape-to-robot) close its loops.
 
-MuJoCo's reader of URDF has none of these (docs/description.md).
+MuJoCo's reader of URDF reads no loops (docs/description.md).
 """
 
 from __future__ import annotations

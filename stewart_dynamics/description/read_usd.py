@@ -32,6 +32,7 @@ from stewart_dynamics.parameters.table import PARAMETERS, STANDARD_GRAVITY
 SUFFIXES = '.usd', '.usda', '.usdc', '.usdz'
 _SINGLE = 1e-6  # relative resolution of its numbers
 _TOGETHER = 1e-5  # frames of a joint that are nearer to each other are one [m]
+_LIMITS = 'physics:lowerLimit', 'physics:upperLimit'
 _AXES = {'X': 0, 'Y': 1, 'Z': 2}
 _NOT_STORED = -1e30  # vectors that are not given have -inf
 # Kinds of joints by the number of axes about which they turn, none of which is limited to nothing.
@@ -87,9 +88,8 @@ class _Scene:
             self.mechanism.remarks.append(
                 f'gravity: no physics scene in the file: {size} m/s^2 against its up axis')
             return size * direction
-        scene = self._physics.Scene(scenes[0])
-        given = float(scene.GetGravityMagnitudeAttr().Get())
-        along = np.array(scene.GetGravityDirectionAttr().Get(), float)
+        given = float(_value(scenes[0], 'physics:gravityMagnitude'))
+        along = np.array(_value(scenes[0], 'physics:gravityDirection'), float)
         if given >= 0.0 and math.isfinite(given):
             size = given * self._length
         if along.any():
@@ -97,35 +97,31 @@ class _Scene:
         return size * direction
 
     def _add_body(self, prim: Any) -> None:
-        mass_api = self._physics.MassAPI(prim)
-        placement = self._placement(prim)
-        name = self._named(prim)
+        placement, name = self._placement(prim), self._named(prim)
         made = MechanismBody(name, placement, shapes=self._shapes(prim))
-        mass = float(mass_api.GetMassAttr().Get() or 0.0)
+        mass = float(_value(prim, 'physics:mass') or 0.0)
         if mass > 0.0:
             made.mass = mass * self._mass
-            center = np.array(mass_api.GetCenterOfMassAttr().Get(), float)
+            center = np.array(_value(prim, 'physics:centerOfMass', [-math.inf] * 3), float)
             if center.min() > _NOT_STORED:
                 made.center = placement.inside(self._point(prim, center))
-            made.inertia = self._inertia(mass_api)
+            made.inertia = self._inertia(prim)
             if not made.inertia.any():
                 made.note = (f'{name}: no inertia: engines compute it from its shapes: 0 kg m^2 '
                              'here')
         else:
             made.note = f'{name}: no mass: engines compute it from its shapes: not read'
-        disabled = prim.GetAttribute('physxRigidBody:disableGravity')
-        if disabled and disabled.Get():
+        if _value(prim, 'physxRigidBody:disableGravity'):
             made.weightless = 'gravity switched off'
         for key in ('physxRigidBody:linearDamping', 'physxRigidBody:angularDamping'):
-            damping = prim.GetAttribute(key)
-            if damping and damping.Get():
-                made.left_out.append(f'{key} {damping.Get():.4g}')
+            if damping := _value(prim, key):
+                made.left_out.append(f'{key} {damping:.4g}')
         self.mechanism.parts[name] = made
 
-    def _inertia(self, mass: Any) -> Array:
-        moments = np.array(mass.GetDiagonalInertiaAttr().Get(), float)
-        axes = mass.GetPrincipalAxesAttr().Get()
-        turn = np.eye(3) if not any((axes.real, *axes.imaginary)) else _rotation(axes)
+    def _inertia(self, prim: Any) -> Array:
+        moments = np.array(_value(prim, 'physics:diagonalInertia', [0.0] * 3), float)
+        axes = _value(prim, 'physics:principalAxes')
+        turn = _rotation(axes) if axes and any((axes.real, *axes.imaginary)) else np.eye(3)
         inertia: Array = turn @ np.diag(moments) @ turn.T * self._mass * self._length ** 2
         return inertia
 
@@ -161,8 +157,8 @@ class _Scene:
     def _end(self, joint: Any, side: int) -> tuple[str, Placement]:
         """Return the body at a side of a joint and the joint's frame there."""
         targets = getattr(joint, f'GetBody{side}Rel')().GetTargets()
-        at = np.array(getattr(joint, f'GetLocalPos{side}Attr')().Get(), float)
-        turn = _rotation(getattr(joint, f'GetLocalRot{side}Attr')().Get())
+        at = np.array(_value(joint.GetPrim(), f'physics:localPos{side}'), float)
+        turn = _rotation(_value(joint.GetPrim(), f'physics:localRot{side}'))
         if not targets:
             return WORLD, Placement(turn, at * self._length)
         prim = joint.GetPrim().GetStage().GetPrimAtPath(targets[0])
@@ -217,9 +213,8 @@ class _Scene:
                 return kind, []
         for schema, kind in ((physics.RevoluteJoint, HINGE), (physics.PrismaticJoint, SLIDE)):
             if prim.IsA(schema):
-                typed = schema(prim)
-                low, high = typed.GetLowerLimitAttr().Get(), typed.GetUpperLimitAttr().Get()
-                axis = _AXES[str(typed.GetAxisAttr().Get())]
+                low, high = (_value(prim, key) for key in _LIMITS)
+                axis = _AXES[str(_value(prim, 'physics:axis'))]
                 return (FIXED, []) if low > high else (kind, [axis])
         free = {axis: self._is_free(prim, axis) for axis in (
             'transX', 'transY', 'transZ', 'rotX', 'rotY', 'rotZ')}
@@ -233,20 +228,17 @@ class _Scene:
         """Return whether an axis of a joint of six is not locked by its limits."""
         if not prim.HasAPI(self._physics.LimitAPI, axis):
             return True
-        limit = self._physics.LimitAPI(prim, axis)
-        return bool(limit.GetLowAttr().Get() <= limit.GetHighAttr().Get())
+        low, high = (_value(prim, f'limit:{axis}:physics:{side}') for side in ('low', 'high'))
+        return bool(low <= high)
 
     def _add_drive(self, prim: Any, made: Joint, axis: str, unit: float) -> None:
         """Add the limits and the drive of a joint; unit: of its positions [m, rad]."""
-        for schema in (self._physics.PrismaticJoint, self._physics.RevoluteJoint):
-            if prim.IsA(schema):
-                joint = schema(prim)
-                ends = joint.GetLowerLimitAttr().Get(), joint.GetUpperLimitAttr().Get()
-                made.lower, made.upper = (
-                    float(end) * unit if math.isfinite(end) else None for end in ends)
-        position = prim.GetAttribute(POSITION)
-        if position and position.HasAuthoredValue():
-            made.position = float(position.Get())
+        made.lower, made.upper = (
+            float(end) * unit if end is not None and math.isfinite(end) else None
+            for end in (_value(prim, key) for key in _LIMITS))
+        position = _value(prim, POSITION)
+        if position is not None:
+            made.position = float(position)
             made.lower, made.upper = (None if end is None else end + made.position
                                       for end in (made.lower, made.upper))
         rate = self._number(prim, rate_limit(axis), unit, math.inf)
@@ -257,12 +249,11 @@ class _Scene:
         for name in names:
             if not prim.HasAPI(self._physics.DriveAPI, name):
                 continue
-            drive = self._physics.DriveAPI(prim, name)
-            stiffness, damping, force = (float(each().Get()) for each in (
-                drive.GetStiffnessAttr, drive.GetDampingAttr, drive.GetMaxForceAttr))
+            stiffness, damping, force = (float(_value(prim, f'drive:{name}:physics:{key}'))
+                                         for key in ('stiffness', 'damping', 'maxForce'))
             if force < 1e30:
                 made.force_max = force * effort
-            if stiffness or drive.GetTypeAttr().Get() != self._physics.Tokens.force:
+            if stiffness or _value(prim, f'drive:{name}:physics:type') != 'force':
                 made.left_out.append(f'a drive to a position, stiffness {stiffness:.6g}')
             else:
                 made.damping = damping * effort / unit
@@ -278,11 +269,16 @@ class _Scene:
 
     def _add_carried(self, root: Any) -> None:
         for name in PARAMETERS:
-            value = root.GetAttribute(attribute_name(VALUE, name))
-            element = root.GetAttribute(attribute_name(ELEMENT, name))
-            if value and value.HasAuthoredValue():
-                self.mechanism.carried[name] = CarriedParameter(
-                    str(value.Get()), str(element.Get()) if element else '')
+            value, element = (_value(root, attribute_name(each, name))
+                              for each in (VALUE, ELEMENT))
+            if value is not None:
+                self.mechanism.carried[name] = CarriedParameter(str(value), str(element or ''))
+
+
+def _value(prim: Any, key: str, default: Any = None) -> Any:
+    """Return the value of an attribute, or the default of its schema; ``default`` without both."""
+    attribute = prim.GetAttribute(key)
+    return attribute.Get() if attribute else default
 
 
 def _rotation(quaternion: Any) -> Array:

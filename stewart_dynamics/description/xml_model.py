@@ -27,7 +27,7 @@ from stewart_dynamics.parameters.table import INERTIA, inertia_matrix
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': BALL, 'spherical': BALL}
 _LIMITS = {'lower': 'lower', 'upper': 'upper', 'velocity': 'velocity_max', 'effort': 'force_max'}
-# Limits that are none; SDFormat's default is 1e16 or, from version 1.10 on, inf.
+# Unlimited: SDFormat's default is 1e16 or, from version 1.10 on, inf.
 _UNLIMITED, _INFINITE = 1e15, ('inf', '+inf', '-inf')
 DRAKE = '{http://drake.mit.edu}'
 _Default = TypeVar('_Default', bound=float | None)
@@ -122,7 +122,7 @@ class XmlModel:
         return Placement(from_euler(angles * values[3:]), values[:3])
 
     def link(self, name: str, what: str) -> str:
-        """Return the name of a link; ``what`` names it in the error that there is none."""
+        """Return the name of a link; ``what`` begins the error that the model has no such link."""
         if name not in self._links:
             raise self.error(f'{what}: no link {name!r}')
         return name
