@@ -645,6 +645,7 @@ def test_an_invalid_trajectory_is_rejected_as_a_whole(renew: Start) -> None:
     node.until_status('planned trajectory', OK, 'accepted: 2 points')
 
 
+@pytest.mark.slow
 def test_trajectories_for_which_the_queue_is_full_are_rejected(renew: Start) -> None:
     node = renew()
     planner = Planner(node)

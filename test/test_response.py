@@ -268,6 +268,7 @@ def seen_by_a_tracker(motion: Motion) -> tuple[Array, Array]:
         tracked.position + [0.1, 0.0, 0.3], to_quaternion(tracked.rotation)])
 
 
+@pytest.mark.slow
 def test_a_known_drive_is_found_from_a_table_of_a_tracker(
         commanded: tuple[Array, Motion], tmp_path: Path) -> None:
     times, motion = commanded
@@ -290,6 +291,7 @@ def test_a_known_drive_is_found_from_a_table_of_a_tracker(
             summary['response'][name]['bandwidth_3db'], rel=0.01)
 
 
+@pytest.mark.slow
 def test_achieved_poses_in_another_unit_are_named(
         commanded: tuple[Array, Motion], tmp_path: Path) -> None:
     times, motion = commanded

@@ -80,6 +80,7 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._presence = 0.0  # of the vehicle's motion, from 0 to 1
         self._held: dict[str, float] = {}
         self._no_approach = ''  # the reason, where it does not start because of it
+        self._tried = False  # to find an approach, without success, since the last tick
         self._ticks = 0
         self._due = 0  # index of the next setpoint, from the begin
         self._periods = DuePeriods(
@@ -137,6 +138,8 @@ class CueingNode(ManagedNode[CueingParameters]):
             samples = self._legs.read(data)
             if not samples:
                 return  # a part: the others follow
+            if self._tried:  # an attempt takes longer than the period of fast legs
+                return
             positions = np.array(samples[-1][1]) + self._settings.geometry.zero_length
             away = np.abs(positions - platform.inverse_kinematics(self._cueing.governor.home))
             pose = (self._cueing.governor.home if away.max() < _AWAY
@@ -153,7 +156,7 @@ class CueingNode(ManagedNode[CueingParameters]):
             found = approach(StewartPlatform(p), pose, home, rate=p.cueing.rate)
         except StewartError as exc:
             # It does not start at home either: the platform is known to be elsewhere.
-            self._no_approach = f'no approach to the home pose: {exc}'
+            self._no_approach, self._tried = f'no approach to the home pose: {exc}', True
             self._log.write([LogLine(ERROR, self._no_approach, 'approach')])
             return
         self._no_approach, self._approach = '', found.motion.rows
@@ -234,6 +237,7 @@ class CueingNode(ManagedNode[CueingParameters]):
 
     def _on_tick(self) -> None:
         now = time.monotonic()
+        self._tried = False
         self._log.write_last(now)
         if not self._active:
             return
