@@ -74,7 +74,7 @@ class Program:
                                 help=f'exit code {STRICT} when {self._strict}')
 
     def prepare(self, mistakes: Iterable[str]) -> None:
-        """Print likely mistakes, and keep memory that is freed."""
+        """Print possible errors, and keep memory that is freed."""
         _keep_freed_memory()
         for mistake in mistakes:
             self.complain(f'warning: {mistake}')
@@ -303,7 +303,7 @@ def add_motor_efforts(group: argparse._ArgumentGroup) -> None:
 
 
 def add_accepted(parser: argparse._ActionsContainer) -> None:
-    """Add the option that writes results in spite of a likely mistake."""
+    """Add the option that writes results in spite of a possible error."""
     parser.add_argument('--accept-mistakes', action='store_true',
                         help='write results although a mistake is likely')
 

@@ -436,7 +436,7 @@ class Outcome(NamedTuple):
 
     judged: tuple[Judged, ...] = ()
     causes: tuple[str, ...] = ()
-    """Keywords of likely mistakes and of the likely cause of a lack of fit, likeliest first."""
+    """Keywords of possible errors and of the likely cause of a lack of fit, likeliest first."""
     notices: tuple[str, ...] = ()
     """Their texts, and notices on the bags."""
     delay: float = np.nan

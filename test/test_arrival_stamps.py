@@ -116,7 +116,7 @@ def test_stamps_of_an_imu_and_of_a_tracker_on_the_base_are_checked(source: str, 
                 np.sin(roll[n] / 2.0), 0.0, 0.0, np.cos(roll[n] / 2.0)], frame='world'))
     said = [each.words for each in feed.setpoints.mistakes(ever=True)]
     assert len(said) == (size > 1)
-    begin = f'base/{source}: likely mistake: stamps of arrival'
+    begin = f'base/{source}: possible error: stamps of arrival'
     assert all(each.startswith(begin) for each in said)
     assert len(feed.setpoints.mistakes()) == len(said)
 

@@ -474,9 +474,9 @@ def test_the_mistake_in_poses_is_named_before_twists_that_are_not_their_derivati
     feed.setpoints.end('')
     for ever, which in ((True, 'first'), (False, 'last')):
         pose, twist, *others = feed.setpoints.mistakes(ever)
-        assert (pose.topic, pose.text) == (POSES, f'{which} setpoint: likely mistake: {text}')
+        assert (pose.topic, pose.text) == (POSES, f'{which} setpoint: possible error: {text}')
         assert 'is not the derivative of the poses' in twist.text
-        assert not any('likely mistake' in each.text for each in (twist, *others))
+        assert not any('possible error' in each.text for each in (twist, *others))
 
 
 def test_poses_alone_have_no_twist_to_be_wrong() -> None:
@@ -495,4 +495,4 @@ def test_gravity_in_the_acceleration_of_a_base_at_rest_is_named() -> None:
     feed.setpoints.end('')
     one, = feed.setpoints.mistakes(ever=True)
     assert one.topic == BASE_ACCEL
-    assert one.text.endswith('likely mistake: gravity is in it, [0, 0, 9.81] m/s^2?')
+    assert one.text.endswith('possible error: gravity is in it, [0, 0, 9.81] m/s^2?')

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measured angles and torques of cranks: pose, external wrench, payload, likely mistakes."""
+"""Measured angles and torques of cranks: pose, external wrench, payload, possible errors."""
 
 from __future__ import annotations
 

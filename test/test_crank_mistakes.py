@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Likely mistakes in parameters of cranks: none in good hexapods, one line for each mistake."""
+"""Possible errors in parameters of cranks: none in good hexapods, one line for each mistake."""
 
 from __future__ import annotations
 

@@ -287,7 +287,7 @@ def ship(amplitude: float, names: str = 'roll pitch yaw', unit: float = 1.0) -> 
 
 
 def mistakes_of(path: Path, tmp_path: Path, *options: str) -> list[str]:
-    """Return the likely mistakes that a replay names in a motion."""
+    """Return the possible errors that a replay names in a motion."""
     replay([str(path), '--params', str(PARAMS), *options, '--output', str(tmp_path / 'r'),
             '--no-report', '--force', '--differentiate'])
     return [f'{each["topic"]}: {each["text"]}' for each in json.loads(
@@ -312,7 +312,7 @@ def test_angles_in_degrees_are_named_and_the_advice_reads_them(
         table['z'] = -table['z']
     path = write(tmp_path / 'ship.csv', table)
     text, *others = mistakes_of(path, tmp_path, '--axes', axes)
-    assert 'likely mistake: angles in degrees' in text and not others
+    assert 'possible error: angles in degrees' in text and not others
     snapshot(text)
     option, value = shlex.split(text[text.index('--columns'):text.index(' reads degrees')])
     assert not mistakes_of(path, tmp_path, '--axes', axes, option, value)

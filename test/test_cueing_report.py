@@ -166,7 +166,7 @@ def test_bad_file_is_named(tmp_path: Path, text: str, capsys: Any, snapshot: Sna
 
 
 def test_strict_ends_with_1_where_limits_hold_back(tmp_path: Path, capsys: Any) -> None:
-    """And a likely mistake in the recording is a warning."""
+    """And a possible error in the recording is a warning."""
     times, forces, rates = drive()
     path = tmp_path / 'wild.csv'
     forces[500:600, 0] += 40.0

@@ -397,8 +397,8 @@ def test_a_motion_in_millimetres_is_named_before_its_twists(
                '--strict') == 1
     printed = ' '.join(capsys.readouterr().out.split())
     assert ('motion not judged, its messages contradict each other or the parameters: '
-            'setpoint/pose: first setpoint: likely mistake: position in mm; ') in printed
-    assert printed.count('likely mistake') == 1
+            'setpoint/pose: first setpoint: possible error: position in mm; ') in printed
+    assert printed.count('possible error') == 1
     assert 'velocity is not the derivative of the poses' in printed
 
 
@@ -483,7 +483,7 @@ def test_a_stiffness_in_another_unit_is_a_likely_mistake(snapshot: Snapshot) -> 
 
 
 def mistakes_in(option: str, values: Any) -> list[str]:
-    """Return the likely mistakes in the units of an option."""
+    """Return the possible errors in the units of an option."""
     if option == '--box':
         return [*doubtful_ranges(np.array(values, dtype=float), PARAMETERS)]
     if option == '--pose':

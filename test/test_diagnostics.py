@@ -382,7 +382,7 @@ def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None
         assert of.level == WARN
         assert re.fullmatch(
             rf'det\(J\) is -{CLEAR.determinants[0]:.3g} m\^3, at home \+[\d.]+ m\^3: the motion '
-            'begins beyond a .*likely mistake: an axis of the other sign, or .*', of.message)
+            'begins beyond a .*possible error: an axis of the other sign, or .*', of.message)
     above = begun(**around)
     above.begins(HOME.motions[0].tolist(), float(CLEAR.determinants[0]))
     answered(above, BEGIN)

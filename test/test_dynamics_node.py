@@ -512,7 +512,7 @@ def test_a_payload_is_picked_up_while_active(node: DynamicsNode) -> None:
     node.answer(MOVING, platform=with_driver)
     assert node.set_atomically([RosParameter('payload.mass', value=0.0)]).successful
     node.answer(MOVING, platform=lighter)
-    # Each change is logged, and likely mistakes.
+    # Each change is logged, and possible errors.
     assert 'platform.mass: 210.0 -> 150.0' in node.program.stderr
     assert ask(mass=150000.0) == [True]
     node.until(lambda: 'cannot carry the platform' in node.program.stderr, 'it is doubted')

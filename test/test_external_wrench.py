@@ -462,7 +462,7 @@ def swing(seconds: Any) -> Motion:
 
 def judged(measurements: Sequence[Measurement], parameters: Parameters = HEXAPOD,
            ) -> list[Estimate]:
-    """Return the estimates from messages, with the likely mistakes in their efforts."""
+    """Return the estimates from messages, with the possible errors in their efforts."""
     def failed(*said: object) -> None:
         pytest.fail(f'{said}')
 

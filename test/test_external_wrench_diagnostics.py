@@ -188,11 +188,11 @@ def test_a_likely_mistake_in_the_efforts_is_a_warning_while_it_is_there(
     mistaken = CLEAR._replace(mistake=LegMistake(what, 'all are wrong'))
     felt(diagnostics, 1.0, mistaken)
     felt(diagnostics, 1.1, mistaken)
-    message = 'measured_legs: likely mistake: all are wrong' + (
+    message = 'measured_legs: possible error: all are wrong' + (
         '; no external wrench is published' * (what == 'sign'))
     assert status(diagnostics, 1.1)[1:3] == (WARN, message)
     values = dict(status(diagnostics, 1.1).values)
-    assert values['likely mistake in the measurements'] == what
+    assert values['possible error in the measurements'] == what
     assert values['wrenches'] == ('0' if what == 'sign' else '2')
     (level, text), = logged(diagnostics, 1.1)
     assert level == WARN
@@ -205,7 +205,7 @@ def test_a_likely_mistake_in_the_efforts_is_a_warning_while_it_is_there(
     level, text = status(diagnostics, 3.05)[1:3]
     assert level == OK
     snapshot(text)
-    assert 'likely mistake in the measurements' not in dict(status(diagnostics, 3.05).values)
+    assert 'possible error in the measurements' not in dict(status(diagnostics, 3.05).values)
 
 
 def test_rejections_after_an_overload_are_named(snapshot: Snapshot) -> None:

@@ -239,7 +239,7 @@ def test_efforts_of_the_opposite_sign_are_named_and_give_no_wrench(
         rest(-1.0)
         status = felt.node.status(STATUS)
         return bool(status.level == WARN) and (
-            'measured_legs: likely mistake: the efforts have the opposite sign' in status.message)
+            'measured_legs: possible error: the efforts have the opposite sign' in status.message)
 
     felt.node.until(reported, 'diagnostics name the sign')
     assert not felt.raw

@@ -382,7 +382,7 @@ def test_forces_given_as_torques_of_motors_are_named(
         code, _, _, err = identified('fourier', '--no-report', '--motor-torque',
                                      params=tmp_path / 'driven.yaml')
         assert code == 2
-        assert 'likely mistake: the efforts are ' in err or limits['limits.force_max'] is None
+        assert 'possible error: the efforts are ' in err or limits['limits.force_max'] is None
         snapshot(err)
 
 

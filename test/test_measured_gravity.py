@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measured gravity: likely mistakes are found by the rules for the parameter, and no others."""
+"""Measured gravity: possible errors are found by the rules for the parameter, and no others."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_right_readings_have_no_mistake() -> None:
     assert imu(force + noise, spin + 0.1 * noise) == []
     # the same with the gyro in deg/s
     one, = imu(force + 0.1 * noise, np.degrees(spin))
-    assert one.endswith('likely mistake: angular_velocity in deg/s?')
+    assert one.endswith('possible error: angular_velocity in deg/s?')
     # a vehicle that turns about the vertical, and brakes
     turning = np.tile([0.0, 0.0, 1.0], (2000, 1))
     assert imu(still(G, 20.0) + [3.0, 2.0, 0.0], turning) == []
@@ -86,7 +86,7 @@ def test_half_a_second_of_free_fall_is_no_mistake() -> None:
 
 def test_an_angular_velocity_that_no_base_has_is_in_degrees() -> None:
     one, = imu(still(G), np.tile([0.0, 0.0, 20.0], (300, 1)))
-    assert one == ('base/imu: angular velocity of 20 rad/s for a second: likely mistake: '
+    assert one == ('base/imu: angular velocity of 20 rad/s for a second: possible error: '
                    'angular_velocity in deg/s?')
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 
-"""Likely mistakes in parameters: no warning for valid hexapods, one for each mistake."""
+"""Possible errors in parameters: no warning for valid hexapods, one for each mistake."""
 
 from __future__ import annotations
 

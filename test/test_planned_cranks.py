@@ -288,7 +288,7 @@ def test_a_point_out_of_reach_is_named_with_its_likely_mistake() -> None:
     result = check_planned_trajectory(StewartPlatform(RIG), times, Motion.of_rows(rows))
     assert result.reason == UNREACHABLE
     assert result.time == 0.0
-    assert result.message.endswith('; likely mistake: position in mm')
+    assert result.message.endswith('; possible error: position in mm')
 
 
 def test_an_angle_that_jumps_to_the_other_end_of_its_turn_is_rejected() -> None:

@@ -25,7 +25,7 @@ SIZE = PLATFORM.parameters['singularity.characteristic_length']
 
 def mistake_of(position: Array, rotation: Array, parameters: Parameters = PLATFORM.parameters,
                first: bool = True) -> str:
-    """Return the likely mistake in a pose."""
+    """Return the possible error in a pose."""
     return pose_mistake(parameters, motion_rows(Pose(position, rotation))[0], first)
 
 
@@ -45,15 +45,15 @@ def test_the_mistake_in_a_pose_is_named(seed: int) -> None:
     position, rotation = home.position + move, turn @ home.rotation
     expected = {
         '': (position, rotation),
-        'likely mistake: position in mm': (1e3 * position, rotation),
-        'likely mistake: a pose counted from home': (move, turn),
-        'likely mistake: a quaternion in the order w x y z': (position, w_first(rotation)),
-        'likely mistake: a pose counted from home and a quaternion in the order w x y z':
+        'possible error: position in mm': (1e3 * position, rotation),
+        'possible error: a pose counted from home': (move, turn),
+        'possible error: a quaternion in the order w x y z': (position, w_first(rotation)),
+        'possible error: a pose counted from home and a quaternion in the order w x y z':
             (move, w_first(turn)),
-        'likely mistake: an axis of the other sign, or geometry.platform_side':
+        'possible error: an axis of the other sign, or geometry.platform_side':
             (position * [1.0, 1.0, -1.0], rotation)}
     if np.linalg.norm(move) > 0.01:
-        expected['likely mistake: position in mm and a pose counted from home'] = 1e3 * move, turn
+        expected['possible error: position in mm and a pose counted from home'] = 1e3 * move, turn
     for text, pose in expected.items():
         assert mistake_of(*pose).split('; ')[-1] == text
         other_side = 'platform_side' in text
@@ -69,5 +69,5 @@ def test_a_pose_just_outside_the_limits_has_no_likely_mistake() -> None:
 def test_without_a_home_pose_only_a_position_in_mm_is_named() -> None:
     parameters = PLATFORM.parameters.replaced({
         'limits.length_min': None, 'limits.length_max': None, 'geometry.zero_length': 0.0})
-    for z, text in ((1e3, 'likely mistake: position in mm'), (1.0, ''), (10.0, '')):
+    for z, text in ((1e3, 'possible error: position in mm'), (1.0, ''), (10.0, '')):
         assert mistake_of(np.array([0.0, 0.0, z]), np.eye(3), parameters) == text

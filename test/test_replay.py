@@ -546,7 +546,7 @@ def test_a_bag_with_z_down_begins_beyond_a_singularity(
           for topic, when, data in motion(2)]
     assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
     printed = ' '.join(capsys.readouterr().out.split())
-    assert 'the motion begins beyond a singularity; likely mistake' in printed
+    assert 'the motion begins beyond a singularity; possible error' in printed
     assert [each['topic'] for each in summary_of(tmp_path / 'out' / 'bag')['mistakes']] == [POSE]
 
 

@@ -212,7 +212,7 @@ def test_an_invalid_stiffness_is_rejected(
             call(poses, given)
 
 
-# Home, likely mistakes, representation
+# Home, possible errors, representation
 
 def test_home_has_the_mean_leg_halfway_between_its_limits() -> None:
     home = ON_EXAMPLE.home_pose()

@@ -654,7 +654,7 @@ def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
     (None, 'good', 'within all limits by the demands of the setpoints'),
     ({'what': 'sign', 'text': 'the efforts have the opposite sign'}, 'warn',
      'within all limits by the demands of the setpoints, which the measured efforts contradict '
-     '(likely mistake: sign)')])
+     '(possible error: sign)')])
 def test_limits_are_held_by_demands_which_measured_efforts_may_contradict(
         mistake: dict[str, str] | None, level: str, line: str) -> None:
     measured = {'setpoints_compared': 2, 'contacts': {'count': 0}, 'residual_share': None,

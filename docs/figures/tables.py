@@ -294,19 +294,19 @@ def measured(page: str, row: str, column: str) -> str:
 
 # A quantity, the words around its figures, their page, and row and column of each.
 Measured = tuple[str, str, str, tuple[tuple[str, str], ...]]
-_ONE = 'one `Motion`'
-_NODE, _ALL_CORES = 'separate, `stewart_dynamics`', '`StewartPlatform.solve`: the default, all cores'
+_INVERSE, _FORWARD = (f'`StewartPlatform.{kind}_dynamics`, one `Motion`'
+                      for kind in ('inverse', 'forward'))
+_NODE = 'separate, `stewart_dynamics`'
 SPEED: tuple[Measured, ...] = (
     ('`platform.inverse_dynamics(motion)` of one sample', '{} ns, {} times `rnea` of Pinocchio',
-     'inverse_dynamics', ((f'`StewartPlatform.inverse_dynamics`, {_ONE}', 'ns'),
-                          (f'`StewartPlatform.inverse_dynamics`, {_ONE}', 'times `pin.rnea` alone'))),
+     'inverse_dynamics', ((_INVERSE, 'ns'), (_INVERSE, 'times `pin.rnea` alone'))),
     ('a sample of a batch, one core; two cores', '{} ns; {} ns', 'inverse_dynamics',
-     (('`solve_many` in C, one core', 'ns'), (_ALL_CORES, 'ns'))),
-    ('`platform.forward_dynamics(motion, forces)`', '{} ns, {} times `aba` of Pinocchio', 'forward',
-     ((f'`StewartPlatform.forward_dynamics`, {_ONE}', 'ns'),
-      (f'`StewartPlatform.forward_dynamics`, {_ONE}', 'times `pin.aba` alone'))),
-    ('`platform.forward_kinematics(lengths, guess)` from 20 % of the height away', '{} ns', 'forward',
-     (('`StewartPlatform.forward_kinematics` from afar, guess a `Pose`', 'ns'),)),
+     (('`solve_many` in C, one core', 'ns'),
+      ('`StewartPlatform.solve`: the default, all cores', 'ns'))),
+    ('`platform.forward_dynamics(motion, forces)`', '{} ns, {} times `aba` of Pinocchio',
+     'forward', ((_FORWARD, 'ns'), (_FORWARD, 'times `pin.aba` alone'))),
+    ('`platform.forward_kinematics(lengths, guess)` from 20 % of the height away', '{} ns',
+     'forward', (('`StewartPlatform.forward_kinematics` from afar, guess a `Pose`', 'ns'),)),
     ('exported C, `stewart_step`: median, slowest motion, worst with interrupts',
      '{} ns, {} ns, {} us', 'exported_source', tuple(
          ('`stewart_step`, gcc', column)

@@ -19,7 +19,7 @@ from stewart_dynamics.signals import interrupt_on_signals
 from stewart_dynamics.tables.reading import Reading
 
 _PROGRAM = Program(
-    'stewart_calibrate', 'parameters or poses, or a likely mistake: nothing is written',
+    'stewart_calibrate', 'parameters or poses, or a possible error: nothing is written',
     'a number is not identifiable or there is a lack of fit', partly=True)
 
 

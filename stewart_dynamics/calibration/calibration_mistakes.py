@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Likely mistakes in measured poses, and numbers that these cannot distinguish.
+Possible errors in measured poses, and numbers that these cannot distinguish.
 
 A mistake is likely if the poses fit the file's geometry, up to a constant of each leg, several
 times better without it: a real error of the geometry does not do that.
@@ -179,7 +179,7 @@ def _on_other_side(parameters: Parameters, equations: Equations, unknown_frames:
 
 def mistakes_of_result(legs: CalibratedLegs, values: Array, residuals: Array, size: float,
                        ) -> Iterator[LikelyMistake]:
-    """Yield likely mistakes that show in calibrated values and their residuals (N, 6)."""
+    """Yield possible errors that show in calibrated values and their residuals (N, 6)."""
     parameters = legs.parameters
     left = float(np.sqrt(np.mean(residuals ** 2)))
     if left > _UNEXPLAINED * size:

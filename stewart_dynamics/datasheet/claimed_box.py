@@ -60,7 +60,7 @@ def read_box(path: Path, parameters: Parameters) -> Array:
 
 
 def doubtful_ranges(ranges: Array, parameters: Parameters) -> Iterator[str]:
-    """Yield likely mistakes in the unit of ranges (6, 2), which no hexapod reaches."""
+    """Yield possible errors in the unit of ranges (6, 2), which no hexapod reaches."""
     longest = parameters.limits.length_max
     far, than = ((10.0 * shape_of(parameters).radius, 'ten times the radius of the joints')
                  if longest is None else (float(np.max(longest)), 'the longest leg'))

@@ -232,7 +232,7 @@ def leg_of(name: str, parameters: Parameters) -> int:
 
 
 def soft_legs(parameters: Parameters, stiffness: float | None) -> Iterator[str]:
-    """Yield a likely mistake in the stiffness of the legs [N/m]: its unit."""
+    """Yield a possible error in the stiffness of the legs [N/m]: its unit."""
     mass = parameters.carried.mass
     circles = parameters.leg_kind.anchor_circles(parameters)
     if circles is not None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
 _PROGRAM = Program('stewart_describe', 'parameters or files, or no hexapod found',
-                   'a likely mistake was found')
+                   'a possible error was found')
 _STANDS_FOR_NONE = dict.fromkeys(
     ('platform.mass', 'platform.inertia'), 'stands for none: write that of the platform')
 _INTERFACES = ('position', 'velocity', 'effort')
@@ -142,7 +142,7 @@ def _read(given: argparse.Namespace, files: FilesOfFolder) -> int:
 
 def _judge(parameters: Parameters, given: argparse.Namespace, warnings: tuple[str, ...] = (),
            ) -> int:
-    """Print warnings and likely mistakes and return the exit code."""
+    """Print warnings and possible errors and return the exit code."""
     from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 
     mistakes = warnings + likely_mistakes(parameters)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The likely mistake in sign and unit of live measured efforts.
+The possible error in sign and unit of live measured efforts.
 
 The judgement is that of ``EffortSums``, as in the replay, on means over blocks: the noise of
 accelerations by differences cancels within a block. Sign and unit are wrong from the first
@@ -36,7 +36,7 @@ class EffortCheck:
         self._begin()
         self._shortest = 1
         self.mistake: LegMistake | None = None
-        """The likely mistake; None without one."""
+        """The possible error; None without one."""
 
     def _begin(self) -> None:
         self._count, self._since = 0, 0

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The likely mistake in measured velocities: they are not the derivatives of the measured positions.
+The possible error in measured velocities: they are not the derivatives of the measured positions.
 
 Poses and twists follow from them, and are compared as those of setpoints are (``Consistency``).
 The legs and the reason are then found in the last measurements.
@@ -39,7 +39,7 @@ class RateCheck:
         self._consistency = Consistency(parameters.singularity.characteristic_length, None)
         self._recent: deque[Measurement] = deque(maxlen=_RECENT)
         self.mistake: LegMistake | None = None
-        """The likely mistake; None without one."""
+        """The possible error; None without one."""
 
     def add(self, measurement: Measurement, estimate: Estimate) -> None:
         """Add a measurement, and the estimate from it; one without a wrench is a restart."""

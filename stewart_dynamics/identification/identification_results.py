@@ -65,7 +65,7 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
     """
     Identify from bags into a folder; return the content of identification.json.
 
-    ``warn`` is called with likely mistakes that were accepted. Raises StewartError if a bag cannot
+    ``warn`` is called with possible errors that were accepted. Raises StewartError if a bag cannot
     be used, or a mistake is likely: nothing is written.
     """
     before = check_free(folder, options, IDENTIFICATION)

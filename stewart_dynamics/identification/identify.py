@@ -390,7 +390,7 @@ class Identification:
                                  self.parameters, self._per_effort is not None))
         if not usable:
             kind = self.parameters.leg_kind
-            reasons = [f'likely mistake: {each.text}' for each in likely] or [
+            reasons = [f'possible error: {each.text}' for each in likely] or [
                 f'is {kind.zero_cause.subject} right, and are the efforts in {kind.effort.unit}?']
             low, *others = *kind.position_limits, kind.effort_limit
             names = ', '.join([low, *(each.rpartition('.')[2] for each in others[:-1])])
@@ -477,7 +477,7 @@ class Identification:
     def _validation(self, found: Fit, noisy: Noisy,
                     ) -> tuple[Residuals | None, list[LikelyMistake]]:
         """
-        Return the residuals at the end of each bag with a fit to the rest, and a likely mistake.
+        Return the residuals at the end of each bag with a fit to the rest, and a possible error.
 
         Values that fit best with legs and gain of the file may predict the end worse than the file
         where only these are off; then all that is uncertain is fitted to the rest, and may be

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
 _PROGRAM = Program(
-    'stewart_identify', 'parameters or bags, or a likely mistake',
+    'stewart_identify', 'parameters or bags, or a possible error',
     'a requested parameter is not identifiable', partly=True)
 
 

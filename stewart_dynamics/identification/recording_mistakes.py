@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Likely mistakes in a recording or a parameter file, as other hypotheses about the same data.
+Possible errors in a recording or a parameter file, as other hypotheses about the same data.
 
 Efforts of another sign or unit, and swapped legs, are compared with the recording by the
 squared misfit of data and prior together, twice the logarithm of the likelihood.
@@ -137,7 +137,7 @@ def of_no_pose(p: Parameters, positions: Array) -> str:
 
 
 def of_delay(delays: Iterable[float]) -> Iterator[LikelyMistake]:
-    """Yield a likely mistake for bags with these delays of the efforts [s]."""
+    """Yield a possible error for bags with these delays of the efforts [s]."""
     longest = max(delays, key=abs)
     if abs(longest) >= LONGEST_LAG:
         yield LikelyMistake(
@@ -147,7 +147,7 @@ def of_delay(delays: Iterable[float]) -> Iterator[LikelyMistake]:
 
 
 def of_efforts(comparison: Comparison, p: Parameters, of_motors: bool) -> Iterator[LikelyMistake]:
-    """Yield a likely mistake in sign or unit of the efforts."""
+    """Yield a possible error in sign or unit of the efforts."""
     scales = comparison.best_scales()
     if scales[0] == 0.0:
         likeliest = 0.0
@@ -168,7 +168,7 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
            lack: LackOfFit | None, residual: float, delays: Sequence[float],
            ) -> Iterator[LikelyMistake]:
     """
-    Yield a likely mistake if the residuals are more than noise, or a delay is long.
+    Yield a possible error if the residuals are more than noise, or a delay is long.
 
     Legs are swapped in the first window. ``residual`` is the RMS of the residuals divided by that
     of the efforts; ``delays`` are those of the bags [s].
@@ -208,7 +208,7 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
 def of_validation(before: Array, after: Array, measured: Array, deviation: float, unit: str,
                   ) -> Iterator[LikelyMistake]:
     """
-    Yield a likely mistake if the file predicts held-out efforts better than the fit.
+    Yield a possible error if the file predicts held-out efforts better than the fit.
 
     ``deviation``: of the fit's prediction, RMS; twice as much is no reason. ``unit``: of efforts.
     """

@@ -231,7 +231,7 @@ class CalibratedLegs(ABC):
 
     @abstractmethod
     def mistakes_of(self, values: Array, size: float) -> Iterator[tuple[str, str]]:
-        """Yield keyword and text of likely mistakes that show in calibrated numbers (n,)."""
+        """Yield keyword and text of possible errors that show in calibrated numbers (n,)."""
 
 
 def listed_groups(legs: CalibratedLegs) -> str:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Likely mistakes in the parameters of cranks: units, signs of motors, zeros of horns, limits.
+Possible errors in the parameters of cranks: units, signs of motors, zeros of horns, limits.
 
 Cranks of a symmetric hexapod have the same angle at home, but for the signs of their motors: one
 that has another sits wrong, or is described wrong.

@@ -77,7 +77,7 @@ class ZeroCause(NamedTuple):
     name: str
     unit: str
     factor: float  # from the unit of positions
-    no_pose: str  # likely mistakes where no pose has the positions
+    no_pose: str  # possible errors where no pose has the positions
     same_as: str = ''  # cause with the same forces
 
     @property
@@ -450,7 +450,7 @@ class LegKind(ABC):
 
     def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[str]:
         """
-        Yield likely mistakes in lengths, from which others would follow, each in one line.
+        Yield possible errors in lengths, from which others would follow, each in one line.
 
         anchors (6, 3): see AtHome.
         """
@@ -458,7 +458,7 @@ class LegKind(ABC):
         return iter(())
 
     def likely_mistakes(self, parameters: Parameters, home: AtHome) -> Iterator[str]:
-        """Yield likely mistakes in other parameters of this kind alone, each in one line."""
+        """Yield possible errors in other parameters of this kind alone, each in one line."""
         del parameters, home
         return iter(())
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Likely mistakes in a gravity vector in base axes, given as a parameter or measured."""
+"""Possible errors in a gravity vector in base axes, given as a parameter or measured."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _HANGING = 0.5
 
 def likely_mistake(gravity: Array, home: Home | None = None) -> str:
     """
-    Return the kind of the likely mistake, empty without one.
+    Return the kind of the possible error, empty without one.
 
     gravity (3,): base axes [m/s^2].
     home: for the side of the platform; None: the direction is not checked.

@@ -3,7 +3,7 @@
 
 
 """
-Likely mistakes in parameters that break no rule: a wrong unit, a geometry that is singular.
+Possible errors in parameters that break no rule: a wrong unit, a geometry that is singular.
 
 All known hexapods are within the bounds with a margin, from one on a fingertip to the cabin of a
 telescope on cables of 300 m; a value outside is a warning, not an error.
@@ -114,7 +114,7 @@ _TILT = math.radians(15.0)
 @lru_cache(maxsize=4)  # the replay of many bags asks for each
 def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str, ...]:
     """
-    Return likely mistakes, each in one line: parameter, value, suspected mistake.
+    Return possible errors, each in one line: parameter, value, suspected mistake.
 
     geometry: check legs and poses as well, which takes ten times as long as the rest.
     """
@@ -236,7 +236,7 @@ def mistakes_in_options(
         p: Parameters, poses: Mapping[str, Sequence[float] | None],
         points: Mapping[str, Sequence[float] | None]) -> Iterator[str]:
     """
-    Yield likely mistakes in poses and points that a user types, each in one line.
+    Yield possible errors in poses and points that a user types, each in one line.
 
     poses: X Y Z ALPHA BETA GAMMA of each option [m, rad]; None if it is not given.
     points: X Y Z of each option in the platform frame [m].

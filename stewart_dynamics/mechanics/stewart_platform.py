@@ -613,7 +613,7 @@ class StewartPlatform:
         return Pose.of_rows(self._home.rows.copy())
 
     def check(self) -> tuple[str, ...]:
-        """Return likely mistakes in the parameters, each in one line."""
+        """Return possible errors in the parameters, each in one line."""
         return likely_mistakes(self.parameters)
 
     def _legs(self, pose: Pose | Motion) -> Lines:

@@ -332,7 +332,7 @@ class DynamicsNode(ManagedNode[Parameters]):
             return payload.PayloadOutcome(silence)
         mistake = self._measured_legs.mistake
         if mistake is not None and not mistake.leaves_wrench:
-            return payload.PayloadOutcome(f'likely mistake: {mistake.text}')
+            return payload.PayloadOutcome(f'possible error: {mistake.text}')
         # Parameters are those of now, whatever changes meanwhile.
         return payload.identify(self._history, StewartPlatform(self._settings))
 

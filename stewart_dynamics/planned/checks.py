@@ -88,7 +88,7 @@ class Checks:
     Finds violations in samples of a trajectory that come in the order of time.
 
     violations: violations found so far, in no order.
-    mistake: the likely mistake in the first pose in which a drive is outside its range, or which a
+    mistake: the possible error in the first pose in which a drive is outside its range, or which a
         leg does not reach; empty without one; None without such a pose.
     condition_number, condition_time: largest condition number so far, and its time [s].
     force, force_leg: largest absolute effort of a drive so far [N] or [N m], and its leg.
@@ -140,7 +140,7 @@ class Checks:
             *unclear, *self._check_singularities(samples), *self._reversals(samples)})
 
     def _name_mistake(self, samples: Samples) -> None:
-        """Name the likely mistake in the pose with which drives first are outside their ranges."""
+        """Name the possible error in the pose with which drives first are outside their ranges."""
         found = [each for each in self.violations if each.limit in self._kind.position_limits]
         if found and self.mistake is None:
             at = int(np.argmax(samples.times >= found[0].time))

@@ -38,7 +38,7 @@ class RecordedMotion(NamedTuple):
     base: BaseMotion | None
     missing: list[str]  # parts of the bag that could not be read
     rejected: int = 0  # number of rejected messages
-    mistakes: tuple[str, ...] = ()  # likely mistakes in the setpoints, or in the base's motion
+    mistakes: tuple[str, ...] = ()  # possible errors in the setpoints, or in the base's motion
     notices: tuple[str, ...] = ()  # about the reading of the bag
     stamps: Stamps = np.empty(0, dtype=np.int64)  # of the messages (N,) [ns]
 

@@ -156,7 +156,7 @@ def _interruptions(points: Summary) -> str:
 
 
 def _inputs(summary: Summary) -> Iterator[Statement]:
-    """Yield the likely mistakes in the messages; not known of a motion without a bag."""
+    """Yield the possible errors in the messages; not known of a motion without a bag."""
     for each in summary.get('mistakes', ()):
         begun = each['first_at_s'] or None
         yield Statement(INPUTS, 'bad', f'{each["topic"]}: {each["text"]}'
@@ -234,8 +234,8 @@ def _held(summary: Summary, topic: str, limits: str) -> Statement:
     mistake = measured.get('likely_mistake')  # not in older summaries
     if mistake is None:
         return Statement(topic, 'good', demands)
-    return Statement(topic, 'warn', f'{demands}, which the measured efforts contradict (likely '
-                                    f'mistake: {mistake["what"]})')
+    return Statement(topic, 'warn', f'{demands}, which the measured efforts contradict (possible '
+                                    f'error: {mistake["what"]})')
 
 
 def _contradicting(summary: Summary) -> bool:

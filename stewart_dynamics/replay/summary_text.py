@@ -28,7 +28,7 @@ _WIDTH = 100
 
 
 def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
-    """Return the summary of a bag, from summary.json; likely mistakes are no part of it."""
+    """Return the summary of a bag, from summary.json; possible errors are no part of it."""
     lines = [f'{summary["bag"]}:']
     if summary['measured']:
         lines += _measured_lines(summary['measured'], kind_in(summary['legs']))
@@ -79,7 +79,7 @@ def measured_headline(measured: Mapping[str, Any], kind: LegKind) -> str:
     if not measured['setpoints_compared']:
         return 'no setpoint could be compared'
     mistake = measured['likely_mistake']
-    likely = '' if mistake is None else f'likely mistake: {mistake["text"]}; ' + (
+    likely = '' if mistake is None else f'possible error: {mistake["text"]}; ' + (
         '' if measured['external_wrench_given'] else 'no external wrench is given; ')
     effort, rms = kind.effort, key_of('residual_rms', kind.effort.unit)
     worst, leg = max((leg[rms], name) for name, leg in measured['legs'].items())

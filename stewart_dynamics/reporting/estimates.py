@@ -30,7 +30,7 @@ _MOST_DECIMALS, _SMALL = 9, 1e-4
 
 
 class LikelyMistake(NamedTuple):
-    """A likely mistake in the data, or a likely cause of a lack of fit."""
+    """A possible error in the data, or a likely cause of a lack of fit."""
 
     what: str  # keyword for programs, as sign, unit, swapped
     text: str  # description in one line

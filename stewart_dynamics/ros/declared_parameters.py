@@ -236,7 +236,7 @@ def changed(parameters: Kind, changes: Mapping[str, Any], configured: bool) -> K
 
 
 def log_changes(before: Parameters, after: Parameters) -> Iterator[tuple[int, str, None]]:
-    """Yield log lines for changed values and for new likely mistakes, as ``RepeatedLog`` takes."""
+    """Yield log lines for changed values and for new possible errors, as ``RepeatedLog`` takes."""
     changes = [f'{name}: {before.given.get(name, before[name])} -> {value}'
                for name, value in after.given.items() if value != before.given.get(name)]
     if changes:

@@ -40,7 +40,7 @@ class ArrivalStamps:
         self._readings: list[Sequence[float]] = []
         self._row = 0  # blocks in a row with stamps of arrival
         self.present: tuple[str, int] | None = None
-        """The likely mistake in the last blocks, and the first stamp of these [ns]."""
+        """The possible error in the last blocks, and the first stamp of these [ns]."""
         self.found: tuple[str, int] | None = None
         """The first one."""
 
@@ -48,7 +48,7 @@ class ArrivalStamps:
         """Return the first mistake if ``ever``, else the present one, for each of the topics."""
         found = self.found if ever else self.present
         return [] if found is None else [
-            Mistake(topic, f'likely mistake: {found[0]}', found[1]) for topic in topics]
+            Mistake(topic, f'possible error: {found[0]}', found[1]) for topic in topics]
 
     def add(self, stamp: int, reading: Sequence[float]) -> None:
         """Add a reading (n,) of any units at its stamp [ns]."""

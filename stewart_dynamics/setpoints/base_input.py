@@ -46,7 +46,7 @@ class BaseInput:
         return self._stream.last_base()
 
     def mistakes(self, ever: bool) -> list[Mistake]:
-        """Return the likely mistakes in the motion of the base, as ``Setpoints.mistakes`` does."""
+        """Return the possible errors in the motion of the base, as ``Setpoints.mistakes`` does."""
         found = inconsistencies(self.consistency, ever, dict.fromkeys(
             QUANTITIES, BASE_TWIST) | dict.fromkeys(RATES, BASE_ACCEL))
         if self._gravity is not None:

@@ -73,7 +73,7 @@ _SMALLEST, _SMALLEST_INTEGRAL = 1e-5, 5e-3
 
 
 class Mistake(NamedTuple):
-    """A likely mistake in the messages of a topic."""
+    """A possible error in the messages of a topic."""
 
     topic: str
     text: str

@@ -63,7 +63,7 @@ class Inconsistency(NamedTuple):
         if self.quantity in RATES and of == POSES:  # the twists are wrong, too
             derivative = 'second derivative'
         unit = UNITS[self.quantity]
-        reason = f': likely mistake: {self.reason}' if self.reason else ''
+        reason = f': possible error: {self.reason}' if self.reason else ''
         return (f'{self.quantity} is not the {derivative} of {of}: {self.given:.3g} {unit} RMS, '
                 f'by differences of {of} {self.expected:.3g} {unit}, they differ by '
                 f'{self.difference:.3g} {unit}{reason}')
@@ -74,7 +74,7 @@ class Inconsistency(NamedTuple):
         unit = UNITS[self.quantity]
         return ((f'{self.quantity} given, RMS ({unit})', f'{self.given:.6g}'),
                 (f'{self.quantity} by differences, RMS ({unit})', f'{self.expected:.6g}'),
-                (f'likely mistake in {self.quantity}', self.reason or 'not known'))
+                (f'possible error in {self.quantity}', self.reason or 'not known'))
 
 
 class Sums:

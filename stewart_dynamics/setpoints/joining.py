@@ -78,7 +78,7 @@ class Setpoints:
 
     def mistakes(self, ever: bool = False) -> list[Mistake]:
         """
-        Return the likely mistakes in setpoints and base motion.
+        Return the possible errors in setpoints and base motion.
 
         ever: all that were found; by default the present ones.
         """
@@ -93,7 +93,7 @@ class Setpoints:
         return mistake + found + self.base.mistakes(ever)
 
     def _angle_mistake(self) -> list[Mistake]:
-        """Return the likely mistake in most poses by angles without a unit, if they are wrong."""
+        """Return the possible error in most poses by angles without a unit, if they are wrong."""
         found = Counter(pose_mistake(self._parameters, pose.row, False, pose.angles)
                         for pose in self.unknown_angles)
         for text, count in found.most_common(1):
@@ -104,7 +104,7 @@ class Setpoints:
         return []
 
     def _pose_mistake(self, which: str, motion: Array) -> list[Mistake]:
-        """Return the likely mistake in the pose of a row of motion."""
+        """Return the possible error in the pose of a row of motion."""
         if not len(motion):
             return []
         text = pose_mistake(self._parameters, motion.tolist(), first=motion is self._first)

@@ -46,7 +46,7 @@ _OF_POSE = {
     AWAY: 'pulls the platform away from the base: is the pose turned over, or its quaternion w '
           'first? For a hexapod that hangs, or whose axes point down, set '
           'geometry.platform_side'}
-_IN_DEGREES = 'likely mistake: angular_velocity in deg/s?'
+_IN_DEGREES = 'possible error: angular_velocity in deg/s?'
 
 
 class _Window(NamedTuple):
@@ -54,7 +54,7 @@ class _Window(NamedTuple):
 
     stamp: int  # its beginning [ns]
     gravity: Array  # (3,) [m/s^2]
-    mistake: str  # kind of the likely mistake
+    mistake: str  # kind of the possible error
     speed: float  # of the base's turning [rad/s]
     by_gyro: float  # change of gravity by the angular velocity [m/s^2]
     seen: float  # change of gravity as measured [m/s^2]
@@ -75,7 +75,7 @@ class MeasuredGravity:
         self._rows: list[Sequence[float]] = []
         self._windows: deque[_Window] = deque(maxlen=_COMPARED)
         self.present: tuple[str, int] | None = None
-        """The likely mistake in the last second, and the stamp of its beginning [ns]."""
+        """The possible error in the last second, and the stamp of its beginning [ns]."""
         self.found: dict[str, tuple[str, int]] = {}
         """The first of each kind."""
 
@@ -107,7 +107,7 @@ class MeasuredGravity:
             self.found.setdefault(kind, self.present)
 
     def _mistake(self) -> tuple[str, str]:
-        """Return kind and words of the likely mistake, empty without one."""
+        """Return kind and words of the possible error, empty without one."""
         windows = list(self._windows)
         last = windows[-_LAST:]
         kind = last[-1].mistake

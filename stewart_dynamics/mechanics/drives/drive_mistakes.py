@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 
-"""Likely mistakes in ``drive.*``: units, shafts, and ratios that other parameters contradict."""
+"""Possible errors in ``drive.*``: units, shafts, and ratios that other parameters contradict."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _OF_A_CYLINDER = 2.5
 
 
 def likely_mistakes(p: Parameters) -> Iterator[str]:
-    """Yield likely mistakes in the drives, each in one line."""
+    """Yield possible errors in the drives, each in one line."""
     lead, ratio = p.actuator.screw_lead, p.drive.gear_ratio
     if lead is None or not p.drives:
         return

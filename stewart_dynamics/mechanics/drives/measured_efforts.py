@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measured efforts as those of the drives, and likely mistakes in their sign and unit."""
+"""Measured efforts as those of the drives, and possible errors in their sign and unit."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def without_losses(forces: Array, rates: Array, accelerations: Array, p: Paramet
 
 
 class LegMistake(NamedTuple):
-    """A likely mistake in measured efforts, velocities or stamps."""
+    """A possible error in measured efforts, velocities or stamps."""
 
     what: str  # keyword: ZERO, SIGN, ...
     text: str
@@ -97,7 +97,7 @@ class LegMistake(NamedTuple):
 
 class EffortSums:
     """
-    Sums over measured and computed forces of the legs, and the likely mistake that they show.
+    Sums over measured and computed forces of the legs, and the possible error that they show.
 
     of_motors: whether the efforts were torques or currents of the motors.
     """
@@ -130,7 +130,7 @@ class EffortSums:
         return scale is not None and 1.0 / FAR < scale < FAR
 
     def mistake(self) -> LegMistake | None:
-        """Return the likely mistake in the efforts; None without one."""
+        """Return the possible error in the efforts; None without one."""
         residual = float(self._residuals.sum())
         # Friction may hold the platform with any force up to its own.
         friction = self.count * float(np.sum(self._parameters.actuator.coulomb_friction ** 2))
@@ -197,7 +197,7 @@ class EffortSums:
 
 def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> LegMistake | None:
     """
-    Return the likely mistake if efforts are ``scale`` times the model's.
+    Return the possible error if efforts are ``scale`` times the model's.
 
     of_motors: whether the efforts were torques or currents of the motors.
     """

@@ -131,11 +131,11 @@ def determinant_at_home(parameters: Parameters) -> float:
 
 
 def other_side(determinant: float, at_home: float) -> str:
-    """Return the likely mistake if a motion begins with another sign of det(J), or nothing."""
+    """Return the possible error if a motion begins with another sign of det(J), or nothing."""
     if not determinant * at_home < 0.0:
         return ''
     return (f'det(J) is {determinant:+.3g} m^3, at home {at_home:+.3g} m^3: the motion begins '
-            'beyond a singularity; likely mistake: an axis of the other sign, or '
+            'beyond a singularity; possible error: an axis of the other sign, or '
             'geometry.platform_side')
 
 

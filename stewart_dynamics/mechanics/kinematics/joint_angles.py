@@ -37,7 +37,7 @@ from stewart_dynamics.parameters.table import Parameters
 
 # No ball joint or universal joint reaches this angle, 92 degrees [rad].
 _WIDEST = 1.6
-# A larger angle between a leg and its axis at home is a likely mistake [rad].
+# A larger angle between a leg and its axis at home is a possible error [rad].
 _AWAY = 0.5 * math.pi
 
 
@@ -81,7 +81,7 @@ def angles_to_check(parameters: Parameters, limits: Sequence[str]) -> JointAngle
 
 
 def likely_mistakes(parameters: Parameters) -> Iterator[str]:
-    """Yield likely mistakes in the joints' limits and axes, each in one line."""
+    """Yield possible errors in the joints' limits and axes, each in one line."""
     for name in OF_JOINTS:
         bounds = parameters[name]
         if bounds is not None and bounds.max() > _WIDEST:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The likely mistake in a pose that the hexapod cannot have: the one without which it can.
+The possible error in a pose that the hexapod cannot have: the one without which it can.
 
 A pose may be counted from home, its position in mm, its quaternion in the order w x y z. Each is a
 hypothesis: the pose without the mistake has all legs within their limits, and det(J) has the sign
@@ -63,7 +63,7 @@ class PoseByAngles(NamedTuple):
 
 
 def typed_pose_mistake(parameters: Parameters, pose: Sequence[float]) -> str:
-    """Return the likely mistake in a pose X Y Z ALPHA BETA GAMMA as a user types it."""
+    """Return the possible error in a pose X Y Z ALPHA BETA GAMMA as a user types it."""
     angles = np.array(pose[3:])
     return pose_mistake(parameters, np.append(pose[:3], from_euler(angles)), angles=Angles(
         float(np.abs(angles).max()), None, from_euler(np.radians(angles))))
@@ -72,7 +72,7 @@ def typed_pose_mistake(parameters: Parameters, pose: Sequence[float]) -> str:
 def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
                  first: bool = True, angles: Angles | None = None) -> str:
     """
-    Return the likely mistake in the pose of a row of motion; empty without one.
+    Return the possible error in the pose of a row of motion; empty without one.
 
     first: whether the motion begins there; on the other side of a singularity is a mistake then.
     angles: of the rotation, which may be in degrees.
@@ -120,7 +120,7 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
             if _FROM_HOME in each:
                 at, turned = home.position + at, turned @ home.rotation
             if is_possible(at, turned):
-                return f'likely mistake: {" and ".join(each)}'
+                return f'possible error: {" and ".join(each)}'
         return other_side(_legs(parameters, position, rotation)[1], at_home) if first else ''
 
 
@@ -140,7 +140,7 @@ def _far(parameters: Parameters, position: Array, rotation: Array) -> str:
     times = lengths / (parameters.limits.length_max if parameters.limits.length_max is not None
                        else shape_of(parameters).radius)
     thousand = np.all((times > _THOUSAND[0]) & (times < _THOUSAND[1]))
-    return f'likely mistake: {_MM}' if thousand else ''
+    return f'possible error: {_MM}' if thousand else ''
 
 
 def _legs(parameters: Parameters, position: Array, rotation: Array) -> tuple[Array, float]:

@@ -149,14 +149,14 @@ class SingularityDiagnostics(StatusPart):
     def __init__(self, answers: Answers) -> None:
         super().__init__(_CROSSING, _NEARNESS)
         self._answers = answers
-        self._other_side = ''  # the likely mistake with which the motion begins there
+        self._other_side = ''  # the possible error with which the motion begins there
         self._crossed = False  # with the last setpoint
         self._crossings: list[str] = []  # since the last report
         self._crossing_logged_at = -PERIOD
         self._largest = 1.0
 
     def begins(self, mistake: str, other_side: bool) -> None:
-        """Note the likely mistake in the first pose, and whether it is beyond a singularity."""
+        """Note the possible error in the first pose, and whether it is beyond a singularity."""
         self._other_side = mistake if other_side else ''
 
     def answered(self, now: float) -> bool:

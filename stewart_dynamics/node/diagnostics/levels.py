@@ -27,7 +27,7 @@ NEVER = -math.inf
 _HOLD_SECONDS = 1.0
 
 REJECTED = ''  # the cause of a level that every status has
-MISTAKEN = 'mistaken'  # that of likely mistakes in messages
+MISTAKEN = 'mistaken'  # that of possible errors in messages
 
 
 class Level(NamedTuple):
@@ -139,7 +139,7 @@ class StatusPart:
             Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now, cause)
 
     def mistaken(self, mistakes: Sequence[Mistake], now: float) -> None:
-        """Note the likely mistakes in the messages; they last until the next call."""
+        """Note the possible errors in the messages; they last until the next call."""
         self._mistakes = mistakes
         self.held.see(Level(WARN if mistakes else OK, '; '.join(
             each.words for each in mistakes)), now, MISTAKEN)
@@ -164,9 +164,9 @@ class StatusPart:
         return [LogLine(level, f'{self.name}: {message}')]
 
     def _mistake_lines(self, now: float) -> list[LogLine]:
-        """Return the log line where likely mistakes begin or end."""
+        """Return the log line where possible errors begin or end."""
         level, message = self.held.of(MISTAKEN, now)
-        return self._changed(level, message or 'no likely mistakes in the messages', MISTAKEN)
+        return self._changed(level, message or 'no possible errors in the messages', MISTAKEN)
 
     def _mistake_values(self) -> Values:
         return [value for each in self._mistakes for value in each.values]

@@ -80,7 +80,7 @@ class DynamicsDiagnostics:
                 self.timing.rejected(rejection, details, now)
 
     def mistaken(self, mistakes: Sequence[Mistake], now: float) -> None:
-        """Note the likely mistakes in setpoints and base motion."""
+        """Note the possible errors in setpoints and base motion."""
         of_base = [each for each in mistakes if each.topic in self.base.heard]
         self.base.mistaken(of_base, now)
         self.setpoints.mistaken([each for each in mistakes if each not in of_base], now)
