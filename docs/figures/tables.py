@@ -347,7 +347,8 @@ def figures_of(results: Sequence[Measured]) -> str:
     """Return a table of measured figures, each with a link to the page of its table."""
     return '\n'.join(['| figure | value | table |', '| --- | --- | --- |', *(
         f'| {what} | {words.format(*(measured(page, *cell) for cell in cells))} | '
-        f'[{page.replace("_", " ")}](results/{page}.md) |' for what, words, page, cells in results)])
+        f'[{page.replace("_", " ")}](results/{page}.md) |'
+        for what, words, page, cells in results)])
 
 
 def pages() -> dict[Path, dict[str, str]]:

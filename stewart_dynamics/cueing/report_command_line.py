@@ -35,7 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _arguments() -> argparse.ArgumentParser:
     parser = _PROGRAM.parser(
         description='What motion cueing does with the recorded motion of a vehicle: '
-                    'demanded and achieved motion, the use of the limits, and the frequency response.',
+                    'demanded and achieved motion, the use of the limits, and the '
+                    'frequency response.',
         files='DIR/ gets cueing.json, report.html, and motion/ (a bag of setpoints, for '
               'stewart_capability --motion and stewart_replay); with --tune cueing.yaml, the '
               'parameters with the proposed gains.')
