@@ -227,7 +227,7 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         '0.384 m about it, and the base is 1.3 m from the center of mass at home: about the '
         "base's origin?"]),
     'a piston in kg mm^2': ({'legs.piston.inertia': 0.32e6}, [
-        'legs.piston.inertia: 3.2e+05 kg m^2, a radius of gyration of 231 m, but no leg is over '
+        'legs.piston.inertia: 3.2e+05 kg m^2, a radius of gyration of 231 m, but a length of '
         '1.65 m: in g mm^2 or kg mm^2?']),
     'gravity in mm/s^2': ({'gravity': [0.0, 0.0, -9806.65]}, [
         'gravity: 9806.65 m/s^2: four times that of Jupiter: in mm/s^2?']),
@@ -238,7 +238,7 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         'the platform joints are 0.6 m from their center: in g, or the joints in cm?']),
     'a cylinder in g': ({'legs.cylinder.mass': 12e3}, [
         'legs.cylinder.mass: 12000 kg, with legs.cylinder.inertia a radius of gyration of '
-        '0.00736 m, but the longest leg is 1.65 m: in g?']),
+        '0.00736 m, but a length of 1.65 m: in g?']),
     'no reflected mass': ({'actuator.reflected_mass': None}, [
         'actuator.reflected_mass: missing, but limits.velocity_max is given: it is '
         'J (2 pi / lead)^2 of rotor and screw; write 0.0 for a drive that has none']),

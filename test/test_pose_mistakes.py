@@ -15,6 +15,7 @@ from stewart_dynamics import Pose, StewartPlatform
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.frames.motion import motion_rows
 from stewart_dynamics.mechanics.frames.rotation import from_euler, from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
 from stewart_dynamics.parameters.table import Parameters
 
@@ -71,3 +72,21 @@ def test_without_a_home_pose_only_a_position_in_mm_is_named() -> None:
         'limits.length_min': None, 'limits.length_max': None, 'geometry.zero_length': 0.0})
     for z, text in ((1e3, 'possible error: position in mm'), (1.0, ''), (10.0, '')):
         assert mistake_of(np.array([0.0, 0.0, z]), np.eye(3), parameters) == text
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_joints_in_the_frame_of_the_other_body_are_named(seed: int) -> None:
+    """The hexapod is the same, but its poses are not those of the frames that the user means."""
+    home, random, p = PLATFORM.home_pose(), rng(seed), PLATFORM.parameters
+    turn = from_euler(random.normal(0.0, 0.05, 3))
+    position = home.position + random.normal(0.0, 0.03 * SIZE, 3)
+    base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
+    for name, joints, text in (
+            ('geometry.base_joints', base - home.position, 'base_joints in the platform frame'),
+            ('geometry.platform_joints', platform + home.position,
+             'platform_joints in the base frame')):
+        wrong = p.replaced({name: joints.ravel()})
+        assert mistake_of(position, turn, wrong) == f'likely mistake: geometry.{text}'
+        # Poses of that file itself are possible.
+        moved = home_pose(wrong)
+        assert mistake_of(moved.position, moved.rotation, wrong) == ''

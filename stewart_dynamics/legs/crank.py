@@ -23,6 +23,7 @@ from stewart_dynamics.legs.lines import (
     AnchorCircles, AnchorPath, dot, joint_arms, Lines, per_leg, skew, transposed)
 from stewart_dynamics.legs.mechanism import Chain, HINGE, LegJoint, MechanismBody, UNIVERSAL
 from stewart_dynamics.legs.tree import BARREL, LegBranch, ROD
+from stewart_dynamics.possible_errors.hypothesis import find_errors, lines_of, PossibleError
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -421,20 +422,20 @@ class Crank(LegKind):
         size: Array = parameters['legs.crank.length']
         return size
 
-    def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[str]:
+    def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[PossibleError]:
         """Yield lengths in mm, and rods that are shorter than the gap at home."""
         return crank_mistakes.wrong_sizes(parameters, anchors)
 
-    def likely_mistakes(self, parameters: Parameters, home: AtHome) -> Iterator[str]:
-        """Yield mistakes in signs and zeros of the cranks, their masses and limits."""
+    def possible_errors(self, parameters: Parameters, home: AtHome) -> Iterator[PossibleError]:
+        """Yield errors in signs and zeros of the cranks, their masses and limits."""
         at = self.lines(parameters, home.position, home.rotation)
         if not np.isfinite(at.directions).all():
             return iter(())
         above, at_home = (
             _angles_of_branches(parameters, position, home.rotation)[2] for position in (
                 crank_mistakes.above_motors(parameters, home), home.position))
-        return crank_mistakes.likely_mistakes(
-            parameters, home, above, at_home, at.levers(), crank_bodies(parameters))
+        return find_errors(crank_mistakes.CRANK_ERRORS, crank_mistakes.Cranks(
+            parameters, home, above, at_home, at.levers(), crank_bodies(parameters)))
 
     def home_rule(self, parameters: Parameters, anchors: Array) -> str:
         """Return that the rods are shorter than the gap, or far too long."""
@@ -460,8 +461,8 @@ class Crank(LegKind):
                 f'{parameters["legs.rod.length"][leg]:.6g} m: does not reach the platform joint '
                 'at home, from which geometry.crank_branch: auto follows')
         if undecided:
-            for mistake in crank_mistakes.limits_in_degrees(parameters):
-                raise ParameterError(f'{parameters.source}: {mistake}')
+            for line in lines_of(crank_mistakes.limits_in_degrees(parameters)):
+                raise ParameterError(f'{parameters.source}: {line}')
             both, leg = divmod(undecided - 1, 6)
             up, down = (angles[leg].round(9) + 0.0).tolist()  # no -3e-16
             words = 'both are possible' if both else 'neither is likely'

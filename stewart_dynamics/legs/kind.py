@@ -25,6 +25,7 @@ from stewart_dynamics.legs.calibrated import CalibratedLegs
 from stewart_dynamics.legs.lines import AnchorCircles, Lines
 from stewart_dynamics.legs.mechanism import Chain, LegJoint, MechanismBody, UNIVERSAL
 from stewart_dynamics.legs.tree import LegBranch
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -114,19 +115,6 @@ class IntervalBounds(NamedTuple):
     pushes: Array  # efforts by a push along the line
     efforts: Array  # efforts without a push
     ends: Array  # forces along the line without a push of the platform, at either end [kg]
-
-
-# Violation of the triangle inequality by principal moments rounded to two or three digits.
-_ROUNDING = 0.02
-
-
-def impossible_inertia(name: str, moments: Array, order: str = 'ixx ixy ixz iyy iyz izz',
-                       ) -> Iterator[str]:
-    """Yield that no body has these principal moments (3,), in ascending order."""
-    if moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
-        listed = ', '.join(f'{each:.3g}' for each in moments)
-        yield (f'{name}: principal moments [{listed}] kg m^2: no body has one '
-               f'larger than the sum of the other two: is the order {order}?')
 
 
 class Solid(NamedTuple):
@@ -448,17 +436,17 @@ class LegKind(ABC):
         del parameters
         return np.ones(6)
 
-    def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[str]:
+    def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[PossibleError]:
         """
-        Yield possible errors in lengths, from which others would follow, each in one line.
+        Yield possible errors in lengths, from which others would follow.
 
         anchors (6, 3): see AtHome.
         """
         del parameters, anchors
         return iter(())
 
-    def likely_mistakes(self, parameters: Parameters, home: AtHome) -> Iterator[str]:
-        """Yield possible errors in other parameters of this kind alone, each in one line."""
+    def possible_errors(self, parameters: Parameters, home: AtHome) -> Iterator[PossibleError]:
+        """Yield possible errors in other parameters of this kind alone."""
         del parameters, home
         return iter(())
 

@@ -12,36 +12,44 @@ telescope on cables of 300 m; a value outside is a warning, not an error.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache, partial
-from itertools import combinations, permutations
+from functools import cached_property, lru_cache, partial
+from itertools import combinations
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.legs.kind import AtHome, impossible_inertia
+from stewart_dynamics.legs.kind import AtHome
 from stewart_dynamics.legs.lines import lines_from
 from stewart_dynamics.mechanics import gravity_mistakes
-from stewart_dynamics.mechanics.drives import drive_mistakes as drives
+from stewart_dynamics.mechanics.drives.drive_mistakes import drive_errors
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.dynamics import lagrange
-from stewart_dynamics.mechanics.frames.motion import listed
-from stewart_dynamics.mechanics.kinematics import joint_angles
+from stewart_dynamics.mechanics.frames.motion import listed, Motion
 from stewart_dynamics.mechanics.kinematics.home_pose import (
-    HEIGHTS, Home, home_legs, home_of, is_too_long, poses_of, Shape, shape_of, turns_about)
+    HEIGHTS, Home, home_legs, home_of, home_pose, is_too_long, poses_of, Shape, shape_of,
+    turns_about)
+from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
+from stewart_dynamics.mechanics.kinematics.joint_axes import AXES
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import typed_pose_mistake
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
-from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
+from stewart_dynamics.mechanics.limits import ANGLES, CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.circles import circle_names
 from stewart_dynamics.parameters.table import (
     BY_IMU, DRIVE_INERTIAS, FIXED, inertia_matrix, NO_MASS, ONE_POINT, Parameters,
     STANDARD_GRAVITY)
+from stewart_dynamics.possible_errors.bodies import IMPOSSIBLE_INERTIA, Moments, Part, PART_ERRORS
+from stewart_dynamics.possible_errors.hypothesis import (
+    find_errors, First, Hypothesis, lines_of, PossibleError, Six, Table, When)
+from stewart_dynamics.possible_errors.transforms import best_order
 
 # Digits of the position of a joint in a message.
 _DIGITS = 5
 _listed = partial(listed, digits=3)
+_JOINTS = _BASE, _PLATFORM = 'geometry.base_joints', 'geometry.platform_joints'
 
 # The largest known, the six cables of a radio telescope's cabin, hang from towers on a circle
 # of 300 m, and the circle of the cabin's joints is 90 times smaller.
@@ -61,9 +69,6 @@ _LARGEST_GYRATION = 30.0
 _SMALLEST_GYRATION = 1.0 / 200.0
 # With a mass in g it is 1/32 as large.
 _SMALLEST_GYRATION_OF_A_MASS = 0.03
-# The same of a leg's part divided by the longest leg: 0.3 for a rod as long as the leg.
-_LARGEST_LEG_GYRATION = 3.0
-_SMALLEST_LEG_GYRATION = 0.01
 
 # The reflected mass of a rotor and screw is 10 to 200 % of the mass that a leg carries. The number
 # of their inertia in kg m^2 is 1e4 to 1e6 times smaller, in kg cm^2 10 to 100 times.
@@ -98,6 +103,10 @@ _AT_HOME = 0.25
 _UNREACHABLE = 3.0
 # An angle limit by the turn of a leg by half of another's stroke: 1 to 10.
 _SMALLEST_ANGLE = 0.25
+# No ball joint or universal joint reaches this angle, 92 degrees [rad].
+_WIDEST = 1.6
+# A larger angle between a leg and its axis at home is a possible error [rad].
+_AWAY = 0.5 * math.pi
 # The frames of base and platform differ at home by more than this, in terms of its height.
 _APART = 0.7
 # A center of mass this many radii of gyration away from the joints leaves 15 % of the mass for the
@@ -111,125 +120,530 @@ _BEHIND = 0.02
 _TILT = math.radians(15.0)
 
 
+class _Body(NamedTuple):
+    """Platform or payload, in a hexapod with platform joints at a radius."""
+
+    name: str
+    mass: float  # [kg]
+    moment: float  # the largest principal moment [kg m^2]
+    radius: float  # [m]
+    larger: float  # of both radii [m]
+
+    @property
+    def gyration(self) -> float:
+        """Return the largest radius of gyration [m]."""
+        return math.sqrt(max(self.moment, 0.0) / self.mass)
+
+
+_SIZE = 'but the platform joints are {radius:.3g} m from their center'
+_GYRATION = f'{{moment:.3g}} kg m^2 at most, a radius of gyration of {{gyration:.3g}} m, {_SIZE}'
+_BODY: Table[_Body] = First(
+    Hypothesis('{name}.inertia', lambda b: b.gyration - _LARGEST_GYRATION * b.larger, (
+        f'{_GYRATION}: in g mm^2 or kg mm^2?')),
+    When(lambda b: b.name == 'platform', First(
+        Hypothesis('{name}.inertia', lambda b: _SMALLEST_GYRATION * b.radius - b.gyration, (
+            f'{_GYRATION}: scaled twice, or the joints in mm?')),
+        Hypothesis('{name}.mass', lambda b: (
+            _SMALLEST_GYRATION_OF_A_MASS * b.radius - b.gyration), (
+            '{mass:.6g} kg, with {name}.inertia a radius of gyration of {gyration:.3g} m, '
+            f'{_SIZE}: in g, or the joints in cm?')))))
+
+
+class _Point(NamedTuple):
+    """A point of the platform frame."""
+
+    name: str  # of its parameter
+    point: Array  # (3,) [m]
+    middle: Array  # of the platform joints (3,) [m]
+    radius: float  # of these [m]
+    larger: float  # of both radii [m]
+
+    @property
+    def text(self) -> str:
+        """Return the point in words."""
+        return _listed(self.point)
+
+    @property
+    def away(self) -> float:
+        """Return its distance from the middle of the joints [m]."""
+        return float(np.linalg.norm(self.point - self.middle))
+
+
+_FAR_POINT: Table[_Point] = Hypothesis(
+    '{name}', lambda s: s.away - _FARTHEST_CENTER * s.larger,
+    f'{{text}} m is {{away:.3g}} m from the middle of the platform joints, {_SIZE}: in mm?')
+
+
+class _File:
+    """A parameter file, and what hypotheses need of it, computed once."""
+
+    def __init__(self, p: Parameters) -> None:
+        self.p, self.kind, self.leg, self.six = p, p.leg_kind, list(p.joints), Six(p)
+        self.shape: Shape = shape_of(p)
+        self.base, self.platform = self.shape.base_radius, self.shape.platform_radius
+        self.larger = self.shape.radius
+        self.points = {name: p[name] for name in _JOINTS}
+        self.base_middle, self.middle = (each.mean(axis=0) for each in self.points.values())
+        self.base_name, self.platform_name = (
+            f'geometry.{body}_joints' if p[circle_names(body)[0]] is None else
+            circle_names(body)[0] for body in ('base', 'platform'))
+        self.angles_name = _BASE if p.geometry.base_angles is None else 'geometry.base_angles'
+        self.mass, self.center = p.platform.mass, p.platform.center_of_mass
+        self.cube = self.platform * self.platform * self.platform  # inf, where ** would raise
+        self.gravity = float(np.linalg.norm(p.gravity))
+        self.gravity_error = gravity_mistakes.likely_mistake(p.gravity)
+        self.weight = p.carried.mass * self.gravity
+        self.force, self.rate = self.six['limits.force_max'], self.six['limits.velocity_max']
+        self.friction = p.actuator.coulomb_friction
+        self.low, self.high = (self.six[f'limits.length_{end}'] for end in ('min', 'max'))
+        self.stroke = self.high - self.low
+        self.texts = {name: _listed(np.unique(p[name])) for name in (
+            'limits.force_max', 'limits.joint_force_max', 'limits.length_min',
+            'limits.length_max', 'geometry.zero_length') if p[name] is not None}
+        # The rotors, and what they carry.
+        self.rotor = self.kind.fields['reflected_mass']
+        self.reflected, reach = self.six[self.rotor], self.kind.reach(p)
+        self.carried = (p.carried.mass + np.sum(p.legs.piston.mass)) / 6.0 * float(
+            np.min(reach)) ** 2
+        self.given = [each for each in (self.kind.rate_limit, self.kind.effort_limit, *_FRICTION)
+                      if each in p.given]
+        effort = self.six[self.kind.effort_limit]
+        if p.drives and p.drive.torque_max is not None:
+            effort = np.minimum(effort, motor_ratio(p) * p.drive.torque_max)
+        self.acceleration = reach * effort / np.where(
+            self.reflected.min() > 0.0, self.reflected, np.nan)  # of the rotors alone
+        self.start = reach * np.nan_to_num(
+            self.six[self.kind.rate_limit]) / self.acceleration
+        # Of the legs, with all their force for a sixth of the platform.
+        self.possible = np.full(6, _LARGEST_ACCELERATION / min(self.larger, 1.0))
+        if self.weight <= self.force.sum():
+            self.possible = np.minimum(self.possible, self.force / (
+                p.carried.mass / 6.0 + p.legs.piston.mass + p.actuator.reflected_mass))
+        self.needed = self.rate ** 2 / (2.0 * self.stroke)
+
+    def body_errors(self) -> Iterator[PossibleError]:
+        """Yield errors in masses and inertias of platform and payload."""
+        for name, (mass, center, inertia) in (
+                ('payload', self.p.payload.body),
+                ('platform', (self.mass, self.center, self.p.platform.inertia))):
+            if mass:
+                moments = np.linalg.eigvalsh(inertia_matrix(inertia))
+                yield from find_errors(_BODY, _Body(
+                    name, mass, float(moments[2]), self.platform, self.larger))
+                yield from find_errors(IMPOSSIBLE_INERTIA, Moments(
+                    f'{name}.inertia', moments[None]))
+                yield from self.far_point(f'{name}.center_of_mass', center)
+
+    def far_point(self, name: str, point: Array) -> Iterator[PossibleError]:
+        """Yield that a point of the platform frame is too far away for its unit."""
+        return find_errors(_FAR_POINT, _Point(
+            name, point, self.middle, self.platform, self.larger))
+
+    @cached_property
+    def has_wrong_size(self) -> bool:
+        """Return whether a size is in another unit, from which other errors would follow."""
+        return any(find_errors(_SIZES, self))
+
+    @property
+    def which(self) -> str:
+        """Return which base joints are at one point; nothing if none are."""
+        reach = max(self.platform, np.abs(self.points[_BASE]).max())
+        if self.base > ONE_POINT * reach:
+            return ''
+        at_one = np.ptp(self.points[_BASE], axis=0).max() <= ONE_POINT * reach
+        return 'six' if at_one else f'{self.kind.anchors_are}, at the middle of their limits,'
+
+    @cached_property
+    def same_place(self) -> str:
+        """Return the first two legs with a joint at the same place, and which, in words."""
+        return next((f'{self.leg[i]} and {self.leg[j]} have the same place in {name}'
+                     for name, joints in self.points.items() for i, j in combinations(range(6), 2)
+                     if np.array_equal(joints[i], joints[j])), '')
+
+
+_Of = Hypothesis[_File]
+
+
+def _too_long(name: str) -> _Of:
+    return _Of(name, lambda f: f.six[name] * is_too_long(f.p, name, f.shape), (
+        f'{{six[{name}]:.3g}} m, but the joints are {{larger:.3g}} m from their center: in mm?'))
+
+
+def _unlike_earth(error: str, words: str) -> _Of:
+    return _Of('gravity', lambda f: f.gravity_error == error, (
+        f'{{gravity:.6g}} m/s^2: {words} The earth has {-STANDARD_GRAVITY[2]:g}'))
+
+
+def _too_weak(name: str) -> _Of:
+    return _Of(name, lambda f: (
+        f.weight > f.six[name].sum() and f.gravity_error != gravity_mistakes.IN_MM), (
+        f'{{texts[{name}]}} N: six such legs cannot carry the platform, {{weight:.3g}} N: in kN?'))
+
+
+_ONE_POINT: Table[_File] = _Of('{angles_name}', lambda f: len(f.which), (
+    'all {which} are at one point: the legs hold the platform in no pose'))
+
+_SIZES: Table[_File] = First(
+    _Of('platform.mass', lambda f: f.mass < _NO_BODY * f.cube, (
+        '{mass:.3g} kg stands for none: forces are those of a hexapod without masses: write the '
+        'mass of the platform')), (
+        _Of('{base_name}', lambda f: f.base > _LARGEST_RADIUS,
+            '{base:.3g} m from their center: larger than any hexapod known: in mm?'),
+        _Of('{platform_name}', lambda f: (
+            f.platform > _SMALL_RADIUS and f.mass < _THINNEST * f.cube),
+            '{platform:.3g} m from their center, and platform.mass only {mass:.3g} kg: in mm?'),
+        _Of('{platform_name}', lambda f: (
+            max(f.base, f.platform) > _LARGEST_RATIO * min(f.base, f.platform)), (
+            '{platform:.3g} m from their center, the {kind.anchors_are} {base:.3g} m: one of them '
+            'in mm?')),
+        *map(_too_long, ('singularity.characteristic_length', 'geometry.zero_length',
+                         'limits.length_min', 'limits.length_max'))))
+
+_ROTORS: Table[_File] = First(
+    _Of('{rotor}', lambda f: len(f.given) * (f.rotor not in f.p.given and not any(
+        each in f.p.given for each in DRIVE_INERTIAS)), (
+        'missing, but {given} is given: it is {kind.reflected} of {kind.rotors}; write 0.0 for a '
+        'drive that has none')),
+    _Of('{rotor}', lambda f: 0.0 < f.reflected.min() < _SMALLEST_REFLECTED_MASS * f.carried and (
+        f.reflected == f.reflected.min()), (
+        '{reflected:.3g} {kind.inertia_unit}, but each leg carries {carried:.3g} '
+        '{kind.inertia_unit}: the inertia of the rotor? It is {kind.reflected}')),
+    _Of('{rotor}', lambda f: np.where(
+        f.start < _SHORTEST_START * min(f.larger, 1.0),
+        f.acceleration - _LARGEST_ACCELERATION / min(f.larger, 1.0), np.nan), (
+        '{reflected:.3g} {kind.inertia_unit}: {kind.effort_limit} alone would accelerate it by '
+        '{acceleration:.3g} m/s^2, more than any motor: the inertia of the rotor in kg cm^2? It '
+        'is {kind.reflected} in {kind.inertia_unit}')))
+
+_LOADS: Table[_File] = (
+    First(
+        _Of('gravity', lambda f: f.gravity_error == gravity_mistakes.IN_MM,
+            '{gravity:.6g} m/s^2: four times that of Jupiter: in mm/s^2?'),
+        When(lambda f: f.p.base.source != BY_IMU, (
+            _unlike_earth(gravity_mistakes.IN_G, 'in g?'),
+            _unlike_earth(gravity_mistakes.NONE, 'none, as in orbit?')))),
+    First(
+        _Of('payload.mass', lambda f: f.mass * f.gravity <= f.force.sum() < f.weight, (
+            '{p[payload.mass]:.3g} kg: six legs with limits.force_max, {texts[limits.force_max]} '
+            'N, cannot carry it and the platform, {weight:.3g} N: in g?')),
+        _too_weak('limits.force_max')),
+    _too_weak('limits.joint_force_max'),
+    When(lambda f: f.weight <= f.force.sum(), _Of(
+        'actuator.coulomb_friction', lambda f: f.friction >= f.force,
+        '{friction:.3g} N: {leg} cannot move with limits.force_max, {force:.3g} N: in mN?')),
+    First(
+        _Of('limits.velocity_max', lambda f: f.rate - _FASTEST * max(f.larger, 1.0),
+            '{rate:.3g} m/s: in mm/s?'),
+        _Of('limits.velocity_max', lambda f: f.needed / f.possible - _UNREACHABLE, (
+            '{rate:.3g} m/s: reached within the stroke of {stroke:.3g} m with {needed:.3g} m/s^2 '
+            'alone, possible are {possible:.3g}: in m/min or mm/s?'))),
+    _Of('legs.cylinder.length', lambda f: f.six['legs.cylinder.length'] - f.low, (
+        '{six[legs.cylinder.length]:.3g} m, but {leg} can be as short as limits.length_min, '
+        '{low:.3g} m: in mm? It is the length from the base joint to the end of the cylinder')),
+    When(lambda f: f.p.limits.leg_clearance_min is not None, _Of(
+        CLEARANCE_MIN, lambda f: len(f.same_place), (
+            f'{{p[{CLEARANCE_MIN}]:.3g}} m, but {{same_place}}: their clearance is never above '
+            'zero; leave the limit out'))))
+
+_NUMBERS: Table[_File] = (
+    _SIZES, lambda f: f.body_errors(), _ROTORS, lambda f: drive_errors(f.p), _LOADS)
+
+
+class _Assembled(_File):
+    """A parameter file whose hexapod can be assembled, and its home pose."""
+
+    def __init__(self, f: _File, home: Home) -> None:
+        vars(self).update(vars(f))
+        p = self.p
+        self.home, self.longest, self.known = home, home.longest, home.length is not None
+        self.away = self.shape.axes[2] * home.side  # from the base to the platform
+        self.height = abs(float(home.heights[0]))
+        self.limit, _, self.limits = ' and '.join(f'{name}: {self.texts[name]} m' for name in (
+            'limits.length_min', 'limits.length_max') if name in self.texts).partition(': ')
+        self.texts |= {'gravity': _listed(p.gravity), 'center': _listed(self.center),
+                       'middle': _listed(self.middle.round(9))}
+        # Whether points are in the frame of the other body.
+        inertia, axes = inertia_matrix(p.platform.inertia), self.shape.axes[:2]
+        self.across, self.about = (
+            math.sqrt(max(float(np.linalg.eigvalsh(of @ inertia @ of.T)[0]), 0.0) / self.mass)
+            for of in (axes, self.away[None]))  # smallest radii of gyration
+        self.far = float(np.linalg.norm(self.center - self.middle))
+        self.lengths = np.linalg.norm(self.points[_PLATFORM] - self.points[_BASE], axis=1)
+        self.in_base_frame = self._is_center_in_base_frame()
+        self.below = abs(float(self.center @ self.away) if self.in_base_frame else (
+            self.height + float((self.center - self.middle) @ self.away)))
+        self.odd = {name: odd for name, joints in self.points.items()
+                    if (odd := odd_joint(joints)) is not None}
+        self.turns = 0.5 * float(np.max(self.stroke / (self.high + self.low)))
+        self.degrees = {name: np.degrees(self.six[name]) for name in OF_JOINTS}
+
+    def _is_center_in_base_frame(self) -> bool:
+        """Return whether the center of mass is where the platform is at home, base frame."""
+        center = self.center - self.base_middle
+        raised = float(center @ self.away) / self.height
+        return bool(np.linalg.norm(self.middle) < 0.5 * np.linalg.norm(self.center) and (
+            self.far > _FAR_FOR_BODY * self.across and (
+                not self.known or _LOWEST < raised < _HIGHEST)
+            or self.known and self.far > _APART * self.height
+            and np.linalg.norm(center - self.height * self.away) < _AT_HOME * self.height))
+
+    @property
+    def joints_in_base_frame(self) -> bool:
+        """
+        Return whether the platform joints are likely given in the base frame.
+
+        They are then where the legs have a possible length while both frames are the same. A base
+        frame away from its joints may be where the platform frame is at home: this is no error.
+        """
+        if (float((self.middle - self.base_middle) @ self.away) < 0.5 * self.lengths.mean()
+                or np.linalg.norm(self.middle) < np.linalg.norm(self.base_middle)):
+            return False
+        if np.isnan(self.stroke).any():  # a center of mass near the origin, and not in the joints
+            return bool(self.far > _FAR_WHERE_JOINTS_ARE * self.across
+                        and np.linalg.norm(self.center) < 0.5 * self.far)
+        return bool(np.all((self.lengths > self.low) & (self.lengths < self.high)))
+
+    @property
+    def apart(self) -> str:
+        """Return that the center of mass is not where the platform joints are, if so."""
+        return '' if self.far < 0.5 * np.linalg.norm(self.middle) else (
+            f', but platform.center_of_mass is {self.far:.3g} m away from it')
+
+    @cached_property
+    def efforts(self) -> Array | None:
+        """Return the efforts of the drives (6,) for the weight at home; None: not known."""
+        p, positions, rotations = self.p, self.home.positions, self.home.rotations
+        jacobian = lagrange.drive_jacobian(
+            lagrange.unchecked_legs(p, positions[:1], rotations[:1]), rotations[:1])[0]
+        weight = p.carried.mass * p.gravity
+        load = np.concatenate([weight, np.cross(rotations[0] @ p.carried.center, weight)])
+        if not np.isfinite(jacobian).all() or np.linalg.cond(jacobian) > UNSOLVABLE_CONDITION:
+            return None
+        return np.asarray(np.linalg.solve(jacobian.T, load))
+
+    @cached_property
+    def torques(self) -> Array:
+        """Return the torques of the motors that hold the platform at home (6,) [N m], or nan."""
+        p = self.p
+        if (not p.drives or not self.known or p.base.source == BY_IMU or self.efforts is None
+                or any(what == 'drive.torque_max' for what, _ in drive_errors(p))):
+            return np.full(6, np.nan)
+        return np.asarray(np.abs(self.efforts) / motor_ratio(p) / p.drive.efficiency)
+
+    @cached_property
+    def of_kind(self) -> tuple[PossibleError, ...]:
+        """Return errors in parameters that the kind of legs has alone."""
+        if self.has_wrong_size or self.odd or not self.known:
+            return ()
+        loaded = self.p.base.source != BY_IMU and self.gravity_error != gravity_mistakes.IN_MM
+        return tuple(self.kind.possible_errors(self.p, AtHome(
+            self.home.positions[0], self.home.rotations[0], self.away, home_legs(self.p)['base'],
+            self.efforts if loaded else None)))
+
+    def symmetry(self) -> Iterator[PossibleError]:
+        """Yield joints that break the symmetry of the others."""
+        for name, odd in self.odd.items():
+            joints = self.points[name]
+            twins = [leg for n, leg in enumerate(self.leg)
+                     if n != odd.joint and np.array_equal(joints[n], joints[odd.joint])]
+            same = f', the same as {twins[0]}' if twins else ''
+            yield PossibleError(name, (
+                f'{self.leg[odd.joint]}: {listed(joints[odd.joint], _DIGITS)} m{same}: the other '
+                f'five {odd.symmetry}, as all six would with {listed(odd.expected, _DIGITS)} m: a '
+                'sign or a digit?'))
+
+    def joint_axes(self) -> Iterator[PossibleError]:
+        """Yield axes of joints from which legs are far away at home."""
+        given = [axes for axes in AXES if self.p[axes] is not None]
+        try:
+            home = home_pose(self.p) if given else None
+        except ParameterError:
+            return
+        if home is None:
+            return  # the angles at home are zero
+        angles = JointAngles(self.p, given)(Motion.from_pose(home).rows[None])[0]
+        for axes, (limit, where) in zip(AXES, ANGLES.items(), strict=True):
+            if axes in given:
+                yield from find_errors(_AXES, _Angles(axes, limit, self.leg, angles[where],
+                                                      self.six[limit]))
+
+    def singularity(self) -> Iterator[PossibleError]:
+        """Yield that all poses that are tried, or home, are singular."""
+        tried = [(height * side * self.larger, math.radians(yaw), tilt)
+                 for height in HEIGHTS for side in (1.0, -1.0)
+                 for yaw in (0.0, 20.0, -20.0, 45.0, -45.0) for tilt in (0.0, _TILT, -_TILT)]
+        heights, angles, tilts = np.array(tried).T
+        turned = turns_about(2, angles) @ turns_about(0, tilts) @ turns_about(1, 0.5 * tilts)
+        stop = self.p.singularity.stop_condition
+        for where, at, turns, suspected in (
+                (f'every pose of {len(tried)} tried: the condition number is at least',
+                 heights, turned,
+                 'are base and platform joints similar hexagons, two legs the same,'),
+                (f'home ({self.home.text}): the condition number is', self.home.heights,
+                 self.home.turns, 'is the platform turned against the base there,')):
+            best = float(_conditions(self.p, self.shape, at, turns).min())
+            if best >= stop:
+                kind = 'singular' if best >= UNSOLVABLE_CONDITION else 'nearly singular'
+                yield PossibleError('geometry', (
+                    f'{kind} at {where} {best:.3g}, singularity.stop_condition is {stop:g}: '
+                    f'{suspected} or the joints in another order?'))
+                return
+
+    @cached_property
+    def shorter(self) -> float:
+        """Return squares of lengths in the best order by those given; keep it as ``order``."""
+        turned = self.home.shape.platform @ self.home.turns[0].T
+        base = (self.points[_BASE] - self.base_middle) @ self.home.shape.axes.T
+        squares = ((base[:, None, :2] - turned[:, :2]) ** 2).sum(axis=-1)
+        order, best = best_order(squares)
+        self.order = str([leg + 1 for leg in order])
+        return best / float(np.trace(squares))
+
+    def part_errors(self) -> Iterator[PossibleError]:
+        """Yield errors in masses of the legs' parts."""
+        for part, joint in (('cylinder', 'base'), ('piston', 'platform')):
+            of = self.p.legs.parts[part]
+            yield from find_errors(_CENTERS, _Center(f'legs.{part}', joint, of.center_of_mass,
+                                                     self.longest))
+            yield from find_errors(PART_ERRORS, Part(
+                f'legs.{part}', of.mass, of.inertia, np.full(6, self.longest)))
+
+
+class _Angles(NamedTuple):
+    """Angles of the legs from the axes of their joints at home."""
+
+    axes: str
+    limit: str
+    leg: Sequence[str]
+    angles: Array  # (6,) [rad]
+    bounds: Array  # (6,) [rad]; nan: not set
+
+    @property
+    def farthest(self) -> Array:
+        """Return the angle that is largest by its limit; nan for the others."""
+        beyond = self.angles - np.nan_to_num(self.bounds)
+        return np.where(np.arange(6) == np.argmax(beyond), self.angles, np.nan)
+
+
+_AXES: Table[_Angles] = First(
+    Hypothesis('{axes}', lambda a: a.farthest - _AWAY, (
+        'at home {leg} is {angles:.3g} rad from it: does it point from the platform to the base, '
+        'is the platform on the other side of the base (geometry.platform_side), or are the legs '
+        'in another order?')),
+    Hypothesis('{limit}', lambda a: a.farthest - a.bounds, (
+        '{bounds:.3g} rad, but at home {leg} is {angles:.3g} rad from its axis in {axes}')))
+
+
+class _Center(NamedTuple):
+    """Centers of mass of a part of each leg, from one of its joints."""
+
+    name: str
+    joint: str
+    center: Array  # (6,) [m]
+    longest: float  # leg [m]
+
+
+_CENTERS: Table[_Center] = First(
+    # Behind the joint there may be a motor, but at most half a leg away from it.
+    Hypothesis('{name}.center_of_mass', lambda c: (
+        (c.center > c.longest) | (c.center < -0.5 * c.longest)), (
+        '{center:.3g} m from the {joint} joint, but no leg is over {longest:.3g} m: in mm?')),
+    When(lambda c: c.joint == 'platform', Hypothesis(
+        '{name}.center_of_mass', lambda c: -_BEHIND * c.longest - c.center, (
+            '{center:.3g} m: behind the platform joint: a sign? It counts from this joint toward '
+            'the base'))))
+_At = Hypothesis[_Assembled]
+
+
+def _small_angle(name: str) -> _At:
+    return _At(name, lambda f: f.six[name] * (f.six[name].max() < _SMALLEST_ANGLE * f.turns), (
+        f'{{six[{name}]:.3g}} rad, {{degrees[{name}]:.2g}} degrees, but the strokes of the legs '
+        'are enough to turn them by {turns:.2g} rad: converted from degrees twice?'))
+
+
+def _wide_angle(name: str) -> _At:
+    return _At(name, lambda f: f.six[name] - _WIDEST, (
+        f'{{six[{name}]:.3g}} rad, {{degrees[{name}]:.0f}} degrees: more than any joint of a leg: '
+        'in degrees?'))
+
+
+_LEGS: Table[_Assembled] = First(  # later entries use the limits that earlier ones doubt
+    _At('limits.length_min', lambda f: _SMALLEST_LENGTH_RATIO * f.high - f.low, (
+        '{texts[limits.length_min]} m, limits.length_max: {texts[limits.length_max]} m: strokes? '
+        'They are lengths from joint to joint')),
+    _At('{limit}', lambda f: not f.home.reachable, (
+        '{limits}: no level pose has all legs within them; the base joints are {base:.3g} m '
+        'from their center, the platform joints {platform:.3g} m: different units?')),
+    When(lambda f: not f.has_wrong_size, First(
+        _At('limits.length_max', lambda f: f.six['geometry.zero_length'] - f.high, (
+            '{texts[limits.length_max]} m, less than geometry.zero_length, '
+            '{texts[geometry.zero_length]} m: a stroke? It is the length from joint to joint')),
+        lambda f: f.part_errors())))
+
+_FRAMES: Table[_Assembled] = (
+    _At('{platform_name}', lambda f: f.platform - _LARGEST_PLATFORM_RATIO * f.base, (
+        '{platform:.3g} m from their center, the {kind.anchors_are} only {base:.3g} m: base and '
+        'platform exchanged?')),
+    _At('gravity', lambda f: f.p.base.source == FIXED and gravity_mistakes.likely_mistake(
+        f.p.gravity, f.home) == gravity_mistakes.AWAY, (
+        '{texts[gravity]} m/s^2 pulls the platform away from the base: a sign? For a hexapod that '
+        'hangs, or whose axes point down, set geometry.platform_side')),
+    _At(_PLATFORM, lambda f: f.joints_in_base_frame / f.lengths, (
+        '{texts[middle]} m is their center, where it is in the base frame, legs of '
+        '{lengths:.3g} m and more{apart}: are the joints given in the base frame? They are '
+        'expected in the platform frame')),
+    _At('platform.center_of_mass', lambda f: f.in_base_frame, (
+        "{texts[center]} m is where the platform is at home in the base frame: from the base's "
+        'origin? It is from that of the platform frame')),
+    When(lambda f: f.known, _At('platform.inertia', lambda f: (
+        f.across > 0.9 * f.below > 0.45 * f.height and f.about < 0.6 * f.across), (
+        'radii of gyration of {across:.3g} m and more across the axis of the hexapod, {about:.3g} '
+        'm about it, and the base is {below:.3g} m from the center of mass at home: about the '
+        "base's origin? It is about the center of mass"))),
+    _At('drive.torque_max', lambda f: f.torques / f.six['drive.torque_max'] - 1.0, (
+        '{six[drive.torque_max]:.3g} N m: {leg} needs {torques:.3g} N m to hold the platform at '
+        'rest at home: at another shaft, or in another unit?')),
+    *map(_small_angle, OF_JOINTS))
+
+_GEOMETRY: Table[_Assembled] = (
+    _LEGS,
+    When(lambda f: not f.has_wrong_size, _FRAMES),
+    lambda f: f.of_kind,
+    First(
+        When(lambda f: len(f.odd) == 1, lambda f: f.symmetry()),
+        When(lambda f: not f.has_wrong_size, (
+            First(lambda f: f.singularity(), lambda f: f.symmetry(),
+                  When(lambda f: not f.of_kind, _At(
+                      _PLATFORM, lambda f: _OTHER_ORDER - f.shorter, (
+                          'at home ({home.text}) the legs are shorter with the platform joints in '
+                          'the order {order}: are the joints in another order?')))),
+            *map(_wide_angle, OF_JOINTS),
+            lambda f: f.joint_axes()))))
+
+
+def _assembled_errors(f: _File) -> Iterator[PossibleError]:
+    """Yield errors of the geometry, if home decides the assembly where the parameters do not."""
+    home = home_of(f.p)
+    try:
+        f.p.choose_branch(lambda: (home.positions[0], home.rotations[0]))
+    except ParameterError:
+        return  # a StewartPlatform is not made of it
+    yield from find_errors(_GEOMETRY, _Assembled(f, home))
+
+
 @lru_cache(maxsize=4)  # the replay of many bags asks for each
 def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str, ...]:
     """
-    Return possible errors, each in one line: parameter, value, suspected mistake.
+    Return possible errors, each in one line: parameter, value, suspected error.
 
     geometry: check legs and poses as well, which takes ten times as long as the rest.
     """
+    # All others would follow from the first two.
+    table: Table[_File] = First(_ONE_POINT, lambda f: f.kind.wrong_sizes(
+        f.p, home_legs(f.p)['base']), (_NUMBERS, When(lambda _: geometry, _assembled_errors)))
     # An overflow of numbers near the largest double is not reported by itself.
     with np.errstate(all='ignore'):
-        shape = shape_of(parameters)
-        if one_point := _base_at_one_point(parameters, shape):
-            return (one_point,)  # all others would follow from it
-        if wrong := tuple(parameters.leg_kind.wrong_sizes(
-                parameters, home_legs(parameters)['base'])):
-            return wrong  # likewise
-        sizes = [*_sizes(parameters, shape)]
-        found = [*sizes, *_inertia(parameters, shape),
-                 *_reflected_mass(parameters, shape), *drives.likely_mistakes(parameters),
-                 *_others(parameters, shape), *_clearance(parameters)]
-        if geometry:
-            home = home_of(parameters)
-            if not _is_assembled(parameters, home):
-                return tuple(found)  # a StewartPlatform is not made of it
-            found += _legs(parameters, home, bool(sizes))
-            if not sizes:
-                found += _frames(parameters, home)
-                found += _torques_at_home(parameters, home)
-                found += _small_angles(parameters, home)
-            odd = tuple(_symmetry(parameters))
-            of_kind = () if sizes or odd else tuple(_of_kind(parameters, home))
-            found += of_kind
-            if len(odd) == 1:
-                found += odd
-            elif not sizes:  # else what follows from a wrong unit
-                found += (tuple(_singular(parameters, home)) or odd or not of_kind
-                          and tuple(_order(parameters, home)) or ())
-                found += joint_angles.likely_mistakes(parameters)
-    return tuple(found)
-
-
-def _sizes(p: Parameters, shape: Shape) -> Iterator[str]:
-    base, platform = shape.base_radius, shape.platform_radius
-    mass = p.platform.mass
-    if mass < _NO_BODY * platform * platform * platform:
-        yield (f'platform.mass: {mass:.3g} kg stands for none: forces are those of a hexapod '
-               'without masses: write the mass of the platform')
-        return
-    if base > _LARGEST_RADIUS:
-        yield (f'{_joints_of(p, "base")}: {base:.3g} m from their center: larger than any hexapod '
-               'known: in mm?')
-    if platform > _SMALL_RADIUS and mass < _THINNEST * platform * platform * platform:
-        yield (f'{_joints_of(p, "platform")}: {platform:.3g} m from their center, and '
-               f'platform.mass only {mass:.3g} kg: in mm?')
-    if max(base, platform) > _LARGEST_RATIO * min(base, platform):
-        yield (f'{_joints_of(p, "platform")}: {platform:.3g} m from their center, the '
-               f'{p.leg_kind.anchors_are} {base:.3g} m: one of them in mm?')
-    for name in ('singularity.characteristic_length', 'geometry.zero_length',
-                 'limits.length_min', 'limits.length_max'):
-        if is_too_long(p, name, shape):
-            yield (f'{name}: {np.max(p[name]):.3g} m, but the joints are {shape.radius:.3g} m '
-                   'from their center: in mm?')
-
-
-def _base_at_one_point(p: Parameters, shape: Shape) -> str:
-    """Return that all base joints are at one point; empty if they are not."""
-    reach = max(shape.platform_radius, np.abs(p.geometry.base_joints).max())
-    if shape.base_radius > ONE_POINT * reach:
-        return ''
-    name = ('geometry.base_joints' if p.geometry.base_angles is None else 'geometry.base_angles')
-    which = 'six' if np.ptp(p.geometry.base_joints, axis=0).max() <= ONE_POINT * reach else (
-        f'{p.leg_kind.anchors_are}, at the middle of their limits,')
-    return f'{name}: all {which} are at one point: the legs hold the platform in no pose'
-
-
-def _joints_of(p: Parameters, body: str) -> str:
-    """Return the parameter that says how far the joints of a body are from their center."""
-    radius = circle_names(body)[0]
-    return f'geometry.{body}_joints' if p[radius] is None else radius
-
-
-def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
-    moments = np.linalg.eigvalsh(inertia_matrix(p.platform.inertia))
-    gyration = math.sqrt(moments[2] / p.platform.mass)
-    yield from _payload(p, shape)
-    size = f'the platform joints are {shape.platform_radius:.3g} m from their center'
-    if gyration > _LARGEST_GYRATION * shape.radius:
-        yield (f'platform.inertia: {moments[2]:.3g} kg m^2 at most, a radius of gyration of '
-               f'{gyration:.3g} m, but {size}: in g mm^2 or kg mm^2?')
-    if gyration < _SMALLEST_GYRATION * shape.platform_radius:
-        yield (f'platform.inertia: {moments[2]:.3g} kg m^2 at most, a radius of gyration of '
-               f'{gyration:.3g} m, but {size}: scaled twice, or the joints in mm?')
-    elif gyration < _SMALLEST_GYRATION_OF_A_MASS * shape.platform_radius:
-        yield (f'platform.mass: {p.platform.mass:.6g} kg, with platform.inertia a radius of '
-               f'gyration of {gyration:.3g} m, but {size}: in g, or the joints in cm?')
-    yield from impossible_inertia('platform.inertia', moments)
-    yield from _far_point('platform.center_of_mass', p.platform.center_of_mass, p, shape)
-
-
-def _payload(p: Parameters, shape: Shape) -> Iterator[str]:
-    mass, center, inertia = p.payload.body
-    if mass == 0.0:
-        return
-    moments = np.linalg.eigvalsh(inertia_matrix(inertia))
-    gyration = math.sqrt(max(float(moments[2]), 0.0) / mass)
-    if gyration > _LARGEST_GYRATION * shape.radius:
-        yield (f'payload.inertia: {moments[2]:.3g} kg m^2 at most, with payload.mass, {mass:.3g} '
-               f'kg, a radius of gyration of {gyration:.3g} m, but the platform joints are '
-               f'{shape.platform_radius:.3g} m from their center: in g mm^2 or kg mm^2?')
-    yield from impossible_inertia('payload.inertia', moments)
-    yield from _far_point('payload.center_of_mass', center, p, shape)
-
-
-def _far_point(name: str, point: Array, p: Parameters, shape: Shape) -> Iterator[str]:
-    """Yield that a point of the platform frame is too far away for its unit."""
-    away = float(np.linalg.norm(point - p.geometry.platform_joints.mean(axis=0)))
-    if away > _FARTHEST_CENTER * shape.radius:
-        yield (f'{name}: {_listed(point)} m is {away:.3g} m from the middle of the platform '
-               f'joints, but the platform joints are {shape.platform_radius:.3g} m from their '
-               'center: in mm?')
+        return tuple(lines_of(find_errors(table, _File(parameters))))
 
 
 def mistakes_in_options(
@@ -246,355 +660,7 @@ def mistakes_in_options(
             yield f'{name}: {listed(np.array(pose), _DIGITS)}: {text}'
     for name, point in points.items():
         if point is not None:
-            yield from _far_point(name, np.array(point), p, shape_of(p))
-
-
-def _frames(p: Parameters, home: Home) -> Iterator[str]:
-    """Yield values that seem to be in the frame of the other body, or on the other side."""
-    shape = home.shape
-    away = shape.axes[2] * home.side  # from the base to the platform
-    if shape.platform_radius > _LARGEST_PLATFORM_RATIO * shape.base_radius:
-        joints = _joints_of(p, 'platform')
-        yield (f'{joints}: {shape.platform_radius:.3g} m from their center, the '
-               f'{p.leg_kind.anchors_are} only {shape.base_radius:.3g} m: base and platform '
-               'exchanged?')
-    if p.base.source == FIXED and gravity_mistakes.likely_mistake(
-            p.gravity, home) == gravity_mistakes.AWAY:
-        yield (f'gravity: {_listed(p.gravity)} m/s^2 pulls the platform away from the base: a '
-               'sign? For a hexapod that hangs, or whose axes point down, set '
-               'geometry.platform_side')
-    center = p.platform.center_of_mass
-    middle = p.geometry.platform_joints.mean(axis=0)
-    height = abs(float(home.heights[0]))
-    base_middle = p.geometry.base_joints.mean(axis=0)
-    inertia = inertia_matrix(p.platform.inertia)
-    across = shape.axes[:2] @ inertia @ shape.axes[:2].T
-    least = math.sqrt(max(float(np.linalg.eigvalsh(across)[0]), 0.0) / p.platform.mass)
-    far = float(np.linalg.norm(center - middle))
-    beyond_body = far > _FAR_FOR_BODY * least
-    if _in_one_frame(p, home, bool(
-            far > _FAR_WHERE_JOINTS_ARE * least and np.linalg.norm(center) < 0.5 * far)):
-        apart = '' if far < 0.5 * np.linalg.norm(middle) else (
-            f', but platform.center_of_mass is {far:.3g} m away from it')
-        yield (f'geometry.platform_joints: {_listed(middle.round(9))} m is their center, '
-               f'where it is in the base frame, legs of {_legs_in_one_frame(p).min():.3g} m and '
-               f'more{apart}: are the joints given in the base frame? They are expected in the '
-               'platform frame')
-    raised = float((center - base_middle) @ away) / height
-    in_base_frame = bool(
-        np.linalg.norm(middle) < 0.5 * np.linalg.norm(center) and (
-            beyond_body and (home.length is None or _LOWEST < raised < _HIGHEST)
-            or home.length is not None
-            and np.linalg.norm(center - base_middle - height * away) < _AT_HOME * height
-            and far > _APART * height))
-    if in_base_frame:
-        yield (f'platform.center_of_mass: {_listed(center)} m is where the platform is at home '
-               "in the base frame: from the base's origin? It is from that of the platform frame")
-    if home.length is None:
-        return  # heights are guesses
-    axial = math.sqrt(max(float(away @ inertia @ away), 0.0) / p.platform.mass)
-    reference = abs(height + float((center - middle) @ away))
-    if in_base_frame:
-        reference = abs(float(center @ away))
-    if least > 0.9 * reference > 0.45 * height and axial < 0.6 * least:
-        yield (f'platform.inertia: radii of gyration of {least:.3g} m and more across the axis of '
-               f'the hexapod, {axial:.3g} m about it, and the base is {reference:.3g} m from '
-               "the center of mass at home: about the base's origin? It is about the center of "
-               'mass')
-
-
-def _legs_in_one_frame(p: Parameters) -> Array:
-    """Return the lengths (6,) of the legs if base and platform joints are in one frame [m]."""
-    return np.asarray(np.linalg.norm(p.geometry.platform_joints - p.geometry.base_joints, axis=1))
-
-
-def _in_one_frame(p: Parameters, home: Home, apart: bool) -> bool:
-    """
-    Return whether the platform joints are likely given in the base frame.
-
-    They are then where the legs have a possible length while both frames are the same. A base
-    frame away from its joints may be where the platform frame is at home: this is no mistake.
-
-    apart: the center of mass is near the platform's origin, and too far away from its joints.
-    """
-    lengths = _legs_in_one_frame(p)
-    low, high = p.limits.length_min, p.limits.length_max
-    base_middle, middle = (each.mean(axis=0) for each in _joints(p).values())
-    offset = float((middle - base_middle) @ home.shape.axes[2]) * home.side
-    if offset < 0.5 * lengths.mean() or np.linalg.norm(middle) < np.linalg.norm(base_middle):
-        return False
-    if low is None or high is None:
-        return apart
-    return bool(np.all((lengths > low) & (lengths < high)))
-
-
-def _torques_at_home(p: Parameters, home: Home) -> Iterator[str]:
-    """Yield that the motors cannot hold the platform where it is at rest at home."""
-    most = p.drive.torque_max
-    if most is None or not p.drives or home.length is None or p.base.source == BY_IMU:
-        return
-    if any(each.startswith('drive.torque_max') for each in drives.likely_mistakes(p)):
-        return
-    efforts = _efforts_at_home(p, home)
-    if efforts is None:
-        return
-    torques = np.abs(efforts) / motor_ratio(p) / p.drive.efficiency
-    at = int(np.argmax(torques / most))
-    if torques[at] > most[at]:
-        yield (f'drive.torque_max: {most[at]:.3g} N m: {p.joints[at]} needs '
-               f'{torques[at]:.3g} N m to hold the platform at rest at home: at another shaft, or '
-               'in another unit?')
-
-
-def _efforts_at_home(p: Parameters, home: Home) -> Array | None:
-    """Return the efforts of the drives (6,) for the weight of the platform; None: not known."""
-    positions, rotations = home.positions, home.rotations
-    jacobian = lagrange.drive_jacobian(
-        lagrange.unchecked_legs(p, positions[:1], rotations[:1]), rotations[:1])[0]
-    weight = p.carried.mass * p.gravity
-    load = np.concatenate([weight, np.cross(rotations[0] @ p.carried.center, weight)])
-    if not np.isfinite(jacobian).all() or np.linalg.cond(jacobian) > UNSOLVABLE_CONDITION:
-        return None
-    efforts: Array = np.linalg.solve(jacobian.T, load)
-    return efforts
-
-
-def _is_assembled(p: Parameters, home: Home) -> bool:
-    """Return whether home decides the assembly of the legs, where the parameters do not."""
-    positions, rotations = home.positions, home.rotations
-    try:
-        p.choose_branch(lambda: (positions[0], rotations[0]))
-    except ParameterError:
-        return False
-    return True
-
-
-def _of_kind(p: Parameters, home: Home) -> Iterator[str]:
-    """Yield mistakes in parameters that the kind of legs has alone."""
-    if home.length is None:
-        return
-    positions, rotations = home.positions, home.rotations
-    known = p.base.source != BY_IMU and (
-        gravity_mistakes.likely_mistake(p.gravity) != gravity_mistakes.IN_MM)
-    yield from p.leg_kind.likely_mistakes(p, AtHome(
-        positions[0], rotations[0], home.shape.axes[2] * home.side, home_legs(p)['base'],
-        _efforts_at_home(p, home) if known else None))
-
-
-def _small_angles(p: Parameters, home: Home) -> Iterator[str]:
-    """Yield limits of the joints' angles that end far before the strokes of the legs."""
-    low, high = p.limits.length_min, p.limits.length_max
-    if low is None or high is None:
-        return
-    turns = 0.5 * float(np.max((high - low) / (high + low)))
-    for name in OF_JOINTS:
-        if p[name] is not None and p[name].max() < _SMALLEST_ANGLE * turns:
-            yield (f'{name}: {p[name].max():.3g} rad, {math.degrees(p[name].max()):.2g} degrees, '
-                   f'but the strokes of the legs are enough to turn them by {turns:.2g} rad: '
-                   'converted from degrees twice?')
-
-
-def _reflected_mass(p: Parameters, shape: Shape) -> Iterator[str]:
-    kind = p.leg_kind
-    name = kind.fields['reflected_mass']
-    formula, unit = kind.reflected, kind.inertia_unit
-    if name not in p.given and not any(each in p.given for each in DRIVE_INERTIAS):
-        given = [each for each in (kind.rate_limit, kind.effort_limit, *_FRICTION)
-                 if each in p.given]
-        if given:
-            yield (f'{name}: missing, but {given[0]} is given: it is {formula} of '
-                   f'{kind.rotors}; write 0.0 for a drive that has none')
-        return
-    reach = kind.reach(p)
-    carried = (p.carried.mass + np.sum(p.legs.piston.mass)) / 6.0
-    masses = p[name]
-    least, moved = float(np.min(masses)), carried * float(np.min(reach)) ** 2
-    if 0.0 < least < _SMALLEST_REFLECTED_MASS * moved:
-        yield (f'{name}: {least:.3g} {unit}, but each leg carries {moved:.3g} {unit}: the inertia '
-               f'of the rotor? It is {formula}')
-        return
-    force, rate = p[kind.effort_limit], p[kind.rate_limit]
-    if least == 0.0 or force is None:
-        return
-    if p.drives and p.drive.torque_max is not None:
-        force = np.minimum(force, motor_ratio(p) * p.drive.torque_max)
-    acceleration = reach * force / masses
-    at = int(np.argmax(acceleration))
-    start = 0.0 if rate is None else reach[at] * rate[at] / acceleration[at]
-    size = min(shape.radius, 1.0)
-    if acceleration[at] > _LARGEST_ACCELERATION / size and start < _SHORTEST_START * size:
-        yield (f'{name}: {masses[at]:.3g} {unit}: {kind.effort_limit} alone would accelerate it '
-               f'by {acceleration[at]:.3g} m/s^2, more than any motor: the inertia of the rotor '
-               f'in kg cm^2? It is {formula} in {unit}')
-
-
-def _others(p: Parameters, shape: Shape) -> Iterator[str]:
-    gravity = float(np.linalg.norm(p.gravity))
-    wrong = gravity_mistakes.likely_mistake(p.gravity)
-    if wrong == gravity_mistakes.IN_MM:
-        yield f'gravity: {gravity:.6g} m/s^2: four times that of Jupiter: in mm/s^2?'
-    elif wrong and p.base.source != BY_IMU:
-        suspected = {gravity_mistakes.IN_G: 'in g?',
-                     gravity_mistakes.NONE: 'none, as in orbit?'}[wrong]
-        yield (f'gravity: {gravity:.6g} m/s^2: {suspected} The earth has '
-               f'{-STANDARD_GRAVITY[2]:g}')
-    weight, most = p.carried.mass * gravity, p.limits.force_max
-    if most is not None and p.platform.mass * gravity <= most.sum() < weight:
-        yield (f'payload.mass: {p.payload.mass:.3g} kg: six legs with limits.force_max, '
-               f'{_listed(np.unique(most))} N, cannot carry it and the platform, {weight:.3g} N: '
-               'in g?')
-    elif most is not None and wrong != gravity_mistakes.IN_MM and weight > most.sum():
-        yield (f'limits.force_max: {_listed(np.unique(most))} N: six such legs cannot carry the '
-               f'platform, {weight:.3g} N: in kN?')
-    rated = p.limits.joint_force_max
-    if rated is not None and wrong != gravity_mistakes.IN_MM and weight > rated.sum():
-        yield (f'limits.joint_force_max: {_listed(np.unique(rated))} N: six such legs cannot '
-               f'carry the platform, {weight:.3g} N: in kN?')
-    friction = p.actuator.coulomb_friction
-    if most is not None and weight <= most.sum() and np.any(friction >= most):
-        at = int(np.argmax(friction - most))
-        yield (f'actuator.coulomb_friction: {friction[at]:.3g} N: {p.joints[at]} cannot move '
-               f'with limits.force_max, {most[at]:.3g} N: in mN?')
-    fastest = p.limits.velocity_max
-    if fastest is not None and fastest.max() > _FASTEST * max(shape.radius, 1.0):
-        yield f'limits.velocity_max: {fastest.max():.3g} m/s: in mm/s?'
-        return
-    low, high = p.limits.length_min, p.limits.length_max
-    if fastest is None or low is None or high is None:
-        return
-    # Along the whole stroke, with all the force of a leg for a sixth of the platform.
-    needed = fastest ** 2 / (2.0 * (high - low))
-    largest = np.full(6, _LARGEST_ACCELERATION / min(shape.radius, 1.0))
-    if most is not None and weight <= most.sum():
-        largest = np.minimum(largest, most / (
-            p.carried.mass / 6.0 + p.legs.piston.mass + p.actuator.reflected_mass))
-    at = int(np.argmax(needed / largest))
-    if needed[at] > _UNREACHABLE * largest[at]:
-        yield (f'limits.velocity_max: {fastest[at]:.3g} m/s: reached within the stroke of '
-               f'{high[at] - low[at]:.3g} m with {needed[at]:.3g} m/s^2 alone, possible are '
-               f'{largest[at]:.3g}: in m/min or mm/s?')
-
-
-def _clearance(p: Parameters) -> Iterator[str]:
-    shortest, cylinders = p.limits.length_min, p.legs.cylinder.length
-    if shortest is not None and cylinders is not None and np.any(cylinders > shortest):
-        at = int(np.argmax(cylinders - shortest))
-        yield (f'legs.cylinder.length: {cylinders[at]:.3g} m, but {p.joints[at]} can be as '
-               f'short as limits.length_min, {shortest[at]:.3g} m: in mm? It is the length from '
-               'the base joint to the end of the cylinder')
-    if p.limits.leg_clearance_min is None:
-        return
-    for name, joints in _joints(p).items():
-        for i, j in combinations(range(6), 2):
-            if np.array_equal(joints[i], joints[j]):
-                yield (f'{CLEARANCE_MIN}: {p.limits.leg_clearance_min:.3g} m, but '
-                       f'{p.joints[i]} and {p.joints[j]} have the same place in {name}: their '
-                       'clearance is never above zero; leave the limit out')
-                return
-
-
-def _joints(p: Parameters) -> dict[str, Array]:
-    return {'geometry.base_joints': p.geometry.base_joints,
-            'geometry.platform_joints': p.geometry.platform_joints}
-
-
-def _legs(p: Parameters, home: Home, wrong_size: bool) -> Iterator[str]:
-    """Yield mistakes of the legs; where joints or lengths have a wrong unit, no others of them."""
-    shape, longest = home.shape, home.longest
-    low, high = p.limits.length_min, p.limits.length_max
-    if low is not None and high is not None and np.any(low < _SMALLEST_LENGTH_RATIO * high):
-        yield (f'limits.length_min: {_listed(np.unique(low))} m, limits.length_max: '
-               f'{_listed(np.unique(high))} m: strokes? They are lengths from joint to joint')
-        return  # the limits are used below
-    if not home.reachable:
-        limits = ' and '.join(f'{name}: {_listed(np.unique(p[name]))} m' for name in (
-            'limits.length_min', 'limits.length_max') if p[name] is not None)
-        yield (f'{limits}: no level pose has all legs within them; the base joints are '
-               f'{shape.base_radius:.3g} m from their center, the platform joints '
-               f'{shape.platform_radius:.3g} m: different units?')
-        return  # any of them may be wrong, so that the other checks would report it again
-    if wrong_size:
-        return
-    if high is not None and np.any(p.geometry.zero_length > high) and not is_too_long(
-            p, 'geometry.zero_length', shape):
-        yield (f'limits.length_max: {_listed(np.unique(high))} m, less than geometry.zero_length, '
-               f'{_listed(np.unique(p.geometry.zero_length))} m: a stroke? It is the length '
-               'from joint to joint')
-        return
-    for part, joint in (('cylinder', 'base'), ('piston', 'platform')):
-        name = f'legs.{part}.center_of_mass'
-        masses, centers = p.legs.parts[part].mass, p.legs.parts[part].center_of_mass
-        inertias = p.legs.parts[part].inertia
-        # Behind the joint there may be a motor, but at most half a leg away from it.
-        outside = (centers > longest) | (centers < -0.5 * longest)
-        if outside.any():
-            yield (f'{name}: {centers[np.argmax(outside)]:.3g} m from the {joint} joint, but no '
-                   f'leg is over {longest:.3g} m: in mm?')
-        elif part == 'piston' and np.any(centers < -_BEHIND * longest):
-            yield (f'{name}: {centers.min():.3g} m: behind the platform joint: a sign? It counts '
-                   'from this joint toward the base')
-        gyration = np.sqrt(np.divide(inertias, masses, where=masses > 0.0, out=np.zeros(6)))
-        at = int(np.argmax(gyration))
-        if gyration[at] > _LARGEST_LEG_GYRATION * longest:
-            yield (f'legs.{part}.inertia: {inertias[at]:.3g} kg m^2, a radius '
-                   f'of gyration of {gyration[at]:.3g} m, but no leg is over {longest:.3g} m: '
-                   'in g mm^2 or kg mm^2?')
-        gyration[gyration == 0.0] = np.inf
-        at = int(np.argmin(gyration))
-        if gyration[at] < _SMALLEST_LEG_GYRATION * longest:
-            yield (f'legs.{part}.mass: {masses[at]:.6g} kg, with legs.{part}.inertia a radius of '
-                   f'gyration of {gyration[at]:.3g} m, but the longest leg is {longest:.3g} m: '
-                   'in g?')
-
-
-def _order(p: Parameters, home: Home) -> Iterator[str]:
-    """Yield that other pairs of joints give shorter legs at home, as in all hexapods known."""
-    turned = home.shape.platform @ home.turns[0].T
-    base = p.geometry.base_joints
-    base = (base - base.mean(axis=0)) @ home.shape.axes.T
-    squares = ((base[:, None, :2] - turned[:, :2]) ** 2).sum(axis=-1)
-    orders = np.array(list(permutations(range(6))))
-    sums = squares[np.arange(6), orders].sum(axis=1)
-    best = int(np.argmin(sums))
-    if sums[best] < _OTHER_ORDER * np.trace(squares):
-        yield (f'geometry.platform_joints: at home ({home.text}) the legs are shorter with the '
-               f'platform joints in the order {(orders[best] + 1).tolist()}: are the joints in '
-               'another order?')
-
-
-def _symmetry(p: Parameters) -> Iterator[str]:
-    for name, joints in _joints(p).items():
-        odd = odd_joint(joints)
-        if odd is not None:
-            twins = [leg for n, leg in enumerate(p.joints)
-                     if n != odd.joint and np.array_equal(joints[n], joints[odd.joint])]
-            same = f', the same as {twins[0]}' if twins else ''
-            yield (f'{name}: {p.joints[odd.joint]}: '
-                   f'{listed(joints[odd.joint], _DIGITS)} m'
-                   f'{same}: the other five {odd.symmetry}, as all six would with '
-                   f'{listed(odd.expected, _DIGITS)} m: a sign or a digit?')
-
-
-def _singular(p: Parameters, home: Home) -> Iterator[str]:
-    shape = home.shape
-    tried = [(height * side * shape.radius, math.radians(yaw), tilt)
-             for height in HEIGHTS for side in (1.0, -1.0)
-             for yaw in (0.0, 20.0, -20.0, 45.0, -45.0) for tilt in (0.0, _TILT, -_TILT)]
-    heights, angles, tilts = np.array(tried).T
-    turned = turns_about(2, angles) @ turns_about(0, tilts) @ turns_about(1, 0.5 * tilts)
-    stop = p.singularity.stop_condition
-    for where, at, turns, suspected in (
-            (f'every pose of {len(tried)} tried: the condition number is at least',
-             heights, turned,
-             'are base and platform joints similar hexagons, two legs the same,'),
-            (f'home ({home.text}): the condition number is', home.heights, home.turns,
-             'is the platform turned against the base there,')):
-        best = float(_conditions(p, shape, at, turns).min())
-        if best >= stop:
-            kind = 'singular' if best >= UNSOLVABLE_CONDITION else 'nearly singular'
-            yield (f'geometry: {kind} at {where} {best:.3g}, singularity.stop_condition is '
-                   f'{stop:g}: {suspected} or the joints in another order?')
-            return
+            yield from lines_of(_File(p).far_point(name, np.array(point)))
 
 
 def _conditions(p: Parameters, shape: Shape, heights: Array, rotations: Array) -> Array:
@@ -606,7 +672,7 @@ def _conditions(p: Parameters, shape: Shape, heights: Array, rotations: Array) -
         home_legs(p)['base'], p.geometry.platform_joints, positions, rotations))
     length = p.singularity.characteristic_length
     if is_too_long(p, 'singularity.characteristic_length', shape):
-        length = shape.platform_radius  # reported already, and not a mistake of the geometry
+        length = shape.platform_radius  # reported already, and not an error of the geometry
     matrices[..., 3:] /= length
     matrices[~np.isfinite(matrices).all(axis=(-2, -1))] = np.zeros((6, 6))
     values = np.linalg.svd(matrices, compute_uv=False)

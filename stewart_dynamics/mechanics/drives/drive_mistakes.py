@@ -14,6 +14,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array, RPM
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.parameters.table import MOTOR_INERTIA, Parameters, SCREW_INERTIA
+from stewart_dynamics.possible_errors.hypothesis import (
+    find_errors, First, Hypothesis, PossibleError, Six, Table, When)
 
 # Screws and belts of legs have leads of 0.5 to 100 mm; in mm the number is at least this.
 _LONGEST_LEAD = 0.5  # [m]
@@ -42,123 +44,108 @@ _MISSED, _FITS = 1.5, 1.2
 _OF_A_CYLINDER = 2.5
 
 
-def likely_mistakes(p: Parameters) -> Iterator[str]:
-    """Yield possible errors in the drives, each in one line."""
-    lead, ratio = p.actuator.screw_lead, p.drive.gear_ratio
-    if lead is None or not p.drives:
-        return
-    speed, curve = p.drive.speed_max, p.drive.torque_speed
-    if lead.max() >= _LONGEST_LEAD:
-        yield f'actuator.screw_lead: {lead.max():g} m for one turn of the screw: in mm?'
-        return
-    for name, fastest in (('drive.speed_max', speed),
-                          ('drive.torque_speed', None if curve is None else curve[-1:, 0])):
-        if fastest is not None and fastest.max() > _FASTEST_MOTOR:
-            yield (f'{name}: {fastest.max():g} rad/s, {fastest.max() * RPM:.0f} rpm: '
-                   'in rpm?')
-            return
-    yield from _inertia(p)
-    yield from _heat(p)
-    forward, back = p.drive.efficiency, p.drive.back_driving_efficiency
-    if np.any(back > forward + _BACK):
-        at = int(np.argmax(back - forward))
-        yield (f'drive.back_driving_efficiency: {back[at]:g}, but drive.efficiency is '
-               f'{forward[at]:g}: a drive that loses this much loses more when it is driven back '
-               f'(2 - 1 / efficiency is {2.0 - 1.0 / forward[at]:.3g}): exchanged?')
-    if speed is None and curve is not None:
-        speed = np.full(6, curve[-1, 0])
-    torque = p.drive.torque_max
-    if torque is None and curve is not None:
-        torque = np.full(6, curve[:, 1].max())
-    rate, force = p.limits.velocity_max, p.limits.force_max
-    if torque is None:
-        return
-    k = motor_ratio(p)
-    most = torque * k * p.drive.efficiency
-    weight = p.carried.mass * float(np.linalg.norm(p.gravity)) / 6.0
-    force = np.full(6, weight) if force is None else force
-    # The reserve of both: above one, the drive cannot reach the limit of the leg.
-    if most.min() > _OF_A_CYLINDER * force.max():
-        yield from _thrust_rating(p, float(most.min()))
-    loads = force / most
-    speeds: Array = np.zeros(6)
-    moves = moved = ''
-    if rate is not None and speed is not None:
-        speeds = rate * k / speed
-        moves = f' and move a leg at {float((speed / k).min()):.3g} m/s'
-        moved = f' and {rate.max():.3g} m/s'
-    if max(loads.max(), speeds.max()) <= _MISSED:
-        return
-    said = (f'the motors can push {most.min():.3g} N{moves}, the legs need '
-            f'{force.max():.3g} N{moved}')
-    for factor, name, words in (
-            (2.0 * math.pi * np.ones(6), 'actuator.screw_lead',
-             f'{lead[0]:g} m: {said}: the travel for one radian? It is that of one turn'),
-            (ratio ** 2, 'drive.gear_ratio', f'{ratio[0]:g}: {said}: inverted? It is the turns of '
-             'the motor in one turn of the screw')):
-        if max((loads * factor).max(), (speeds / factor).max()) <= _FITS and factor[0] != 1.0:
-            yield f'{name}: {words}'
-            return
-    if weight > most.min():
-        yield (f'drive.torque_max: {torque.min():g} N m: {said}: less than a sixth of the weight')
+class _Drives:
+    """The drives of a parameter file; nan where something is not set."""
+
+    def __init__(self, p: Parameters) -> None:
+        six, drive = Six(p), p.drive
+        self.p, self.six, self.drive = p, six, drive
+        self.lead, self.ratio, self.motor = (
+            six['actuator.screw_lead'], drive.gear_ratio, drive.motor_inertia)
+        self.screw = drive.screw_inertia / self.ratio ** 2  # at the motor [kg m^2]
+        self.peak, self.fastest = six['drive.torque_max'], six['drive.speed_max']
+        self.curve = np.full((1, 2), np.nan) if drive.torque_speed is None else drive.torque_speed
+        self.end = self.curve[-1:, 0]
+        self.rpm = {'fastest': self.fastest * RPM, 'end': self.end * RPM}
+        # The rotors reach their speed in the first time, as rotors without mass do at once.
+        self.start = np.where(self.motor.any(), self.motor, np.nan) * self.fastest / self.peak
+        # Heat at the continuous torque, and at the peak torque by the largest power.
+        self.lasting = (_OF_PEAK * self.peak if drive.torque_continuous is None else
+                        drive.torque_continuous)
+        self.time, to_ambient = (six[f'drive.thermal_{each}'] for each in (
+            'time_constant', 'resistance'))
+        self.density = self.lasting * _HEAT_CAPACITY * to_ambient / self.time
+        self.grams = 1000.0 * self.time / to_ambient / _HEAT_CAPACITY
+        self.loss, constant = six['drive.resistance'], six['drive.torque_constant']
+        self.watts = self.loss * (self.lasting / constant) ** 2
+        self.heat = np.fmax(self.watts * to_ambient / _HOTTEST, self.loss * (
+            self.peak / constant) ** 2 / (self.peak * self.fastest) / _LARGEST_HEAT)
+        self.forward, self.back = drive.efficiency, drive.back_driving_efficiency
+        self.usual_back = 2.0 - 1.0 / self.forward
+        # What the motors can do, and what the legs need.
+        k, speed = motor_ratio(p), np.where(
+            drive.speed_max is None, self.curve[-1, 0], self.fastest)
+        torque = np.where(drive.torque_max is None, self.curve[:, 1].max(), self.peak)
+        self.torque, self.pushed = float(torque.min()), float((torque * k * self.forward).min())
+        self.weight = p.carried.mass * float(np.linalg.norm(p.gravity)) / 6.0
+        self.carried = (p.carried.mass / 6.0 + p.legs.piston.mass).max()
+        self.reflected = p.actuator.reflected_mass
+        force = np.full(6, self.weight) if p.limits.force_max is None else p.limits.force_max
+        self.needed = float(force.max())
+        self.loads = force / (torque * k * self.forward)
+        self.rates = np.nan_to_num(six['limits.velocity_max'] * k / speed)
+        rate, moves, moved = p.limits.velocity_max, '', ''
+        if rate is not None and np.isfinite(speed).all():
+            moves = f' and move a leg at {float((speed / k).min()):.3g} m/s'
+            moved = f' and {rate.max():.3g} m/s'
+        self.said = (f'the motors can push {self.pushed:.3g} N{moves}, the legs need '
+                     f'{self.needed:.3g} N{moved}')
+
+    def missed(self, factor: Array | float = 1.0) -> float:
+        """Return the limits of the legs by those of the drives, with another ratio."""
+        return max(float((self.loads * factor).max()), float((self.rates / factor).max()))
 
 
-def _thrust_rating(p: Parameters, pushed: float) -> Iterator[str]:
-    """Yield that the limit of the actuators' forces looks like one of the forces in the joints."""
-    force, reflected = p.limits.force_max, p.actuator.reflected_mass
-    carried = p.carried.mass / 6.0 + p.legs.piston.mass
-    if p.limits.joint_force_max is not None or force is None or np.any(reflected < carried):
-        return
-    yield (f'limits.force_max: {force.max():.3g} N: the motors can push {pushed:.3g} N, of which '
-           f'actuator.reflected_mass, {reflected.max():.3g} kg, takes more than the '
-           f'{carried.max():.3g} kg that a leg carries: the thrust rating of a cylinder? It is '
-           'limits.joint_force_max')
+_Of = Hypothesis[_Drives]
+_START = ('{motor:g} kg m^2 reaches drive.speed_max under drive.torque_max in {start:.2g} s: in '
+          'other units than kg m^2, or at the screw?')
+_TABLE: Table[_Drives] = First(
+    _Of('actuator.screw_lead', lambda d: np.where(d.lead >= _LONGEST_LEAD, d.lead, 0.0),
+        '{lead:g} m for one turn of the screw: in mm?'),
+    _Of('drive.speed_max', lambda d: d.fastest - _FASTEST_MOTOR,
+        '{fastest:g} rad/s, {rpm[fastest]:.0f} rpm: in rpm?'),
+    _Of('drive.torque_speed', lambda d: d.end - _FASTEST_MOTOR,
+        '{end:g} rad/s, {rpm[end]:.0f} rpm: in rpm?'), (
+        First(
+            _Of(MOTOR_INERTIA, lambda d: (
+                SCREW_INERTIA in d.p.given and MOTOR_INERTIA not in d.p.given), (
+                f'missing, but {SCREW_INERTIA} is given: is that the inertia of the rotor, at the '
+                'wrong shaft? Write 0.0 for a rotor without inertia')),
+            _Of(SCREW_INERTIA, lambda d: d.motor.any() and np.where(
+                d.screw > _LARGEST_SCREW * d.motor, d.screw / d.motor, 0.0), (
+                '{p[drive.screw_inertia]:g} kg m^2 is {screw:.3g} kg m^2 at the motor, whose '
+                'rotor has {motor:g}: other units, or at another shaft?'))),
+        First(_Of(MOTOR_INERTIA, lambda d: d.start - _SLOWEST_START, _START),
+              _Of(MOTOR_INERTIA, lambda d: _FASTEST_START - d.start, _START)),
+        _Of('drive.thermal_time_constant', lambda d: d.density - _DENSEST_TORQUE, (
+            '{time:g} s: the heat capacity of {grams:.3g} g of metal for a motor of '
+            '{lasting:.3g} N m: in minutes?')),
+        _Of('drive.resistance', lambda d: d.heat - 1.0, (
+            '{loss:g} Ohm: {lasting:.3g} N m would need {watts:.3g} W: in mOhm, or '
+            'drive.torque_constant in mN m/A?')),
+        _Of('drive.back_driving_efficiency', lambda d: d.back - d.forward - _BACK, (
+            '{back:g}, but drive.efficiency is {forward:g}: a drive that loses this much loses '
+            'more when it is driven back (2 - 1 / efficiency is {usual_back:.3g}): exchanged?')),
+        # Of the thrust rating of a cylinder the rotors, not the rods, take most.
+        _Of('limits.force_max', lambda d: (
+            d.pushed > _OF_A_CYLINDER * d.needed and d.p.limits.joint_force_max is None
+            and d.p.limits.force_max is not None and d.reflected * (
+                d.reflected >= d.p.carried.mass / 6.0 + d.p.legs.piston.mass).all()), (
+            '{needed:.3g} N: the motors can push {pushed:.3g} N, of which '
+            'actuator.reflected_mass, {reflected:.3g} kg, takes more than the {carried:.3g} kg '
+            'that a leg carries: the thrust rating of a cylinder? It is limits.joint_force_max')),
+        When(lambda d: d.missed() > _MISSED, First(
+            _Of('actuator.screw_lead', lambda d: d.missed(2.0 * math.pi) <= _FITS,
+                '{lead:g} m: {said}: the travel for one radian? It is that of one turn'),
+            _Of('drive.gear_ratio', lambda d: (
+                d.missed(d.ratio ** 2) <= _FITS and d.ratio[0] != 1.0), (
+                '{ratio:g}: {said}: inverted? It is the turns of the motor in one turn of the '
+                'screw')),
+            _Of('drive.torque_max', lambda d: d.weight - d.pushed,
+                '{torque:g} N m: {said}: less than a sixth of the weight')))))
 
 
-def _heat(p: Parameters) -> Iterator[str]:
-    """Yield that windings would be heated as no motor is."""
-    peak, lasting = p.drive.torque_max, p.drive.torque_continuous
-    torque = lasting if lasting is not None or peak is None else _OF_PEAK * peak
-    resistance, constant = p.drive.resistance, p.drive.torque_constant
-    speed = p.drive.speed_max
-    if torque is None:
-        return
-    to_ambient, time = p.drive.thermal_resistance, p.drive.thermal_time_constant
-    if time is not None and to_ambient is not None:
-        density = torque * _HEAT_CAPACITY * to_ambient / time
-        at = int(np.argmax(density))
-        if density[at] > _DENSEST_TORQUE:
-            yield (f'drive.thermal_time_constant: {time[at]:g} s: the heat capacity of '
-                   f'{1000.0 * time[at] / to_ambient[at] / _HEAT_CAPACITY:.3g} g of metal for a '
-                   f'motor of {torque[at]:.3g} N m: in minutes?')
-    if resistance is None or constant is None:
-        return
-    rise = 0.0 * torque if to_ambient is None else (
-        resistance * (torque / constant) ** 2 * to_ambient)
-    heat = 0.0 * torque if peak is None or speed is None else (
-        resistance * (peak / constant) ** 2 / (peak * speed))
-    at = int(np.argmax(np.maximum(rise / _HOTTEST, heat / _LARGEST_HEAT)))
-    if rise[at] > _HOTTEST or heat[at] > _LARGEST_HEAT:
-        yield (f'drive.resistance: {resistance[at]:g} Ohm: {torque[at]:.3g} N m would need '
-               f'{resistance[at] * (torque[at] / constant[at]) ** 2:.3g} W: in mOhm, or '
-               'drive.torque_constant in mN m/A?')
-
-
-def _inertia(p: Parameters) -> Iterator[str]:
-    ratio, torque, speed = p.drive.gear_ratio, p.drive.torque_max, p.drive.speed_max
-    motor, screw = p.drive.motor_inertia, p.drive.screw_inertia
-    if SCREW_INERTIA in p.given and MOTOR_INERTIA not in p.given:
-        yield (f'{MOTOR_INERTIA}: missing, but {SCREW_INERTIA} is given: is that the inertia of '
-               'the rotor, at the wrong shaft? Write 0.0 for a rotor without inertia')
-    elif np.any(screw / ratio ** 2 > _LARGEST_SCREW * motor) and motor.any():
-        at = int(np.argmax(screw / ratio ** 2 / np.where(motor > 0.0, motor, np.inf)))
-        yield (f'{SCREW_INERTIA}: {screw[at]:g} kg m^2 is {screw[at] / ratio[at] ** 2:.3g} kg m^2 '
-               f'at the motor, whose rotor has {motor[at]:g}: other units, or at another shaft?')
-    if torque is None or speed is None or not motor.any():
-        return
-    start = motor * speed / torque
-    if start.max() > _SLOWEST_START or start.min() < _FASTEST_START:
-        at = int(np.argmax(start)) if start.max() > _SLOWEST_START else int(np.argmin(start))
-        yield (f'{MOTOR_INERTIA}: {motor[at]:g} kg m^2 reaches drive.speed_max under '
-               f'drive.torque_max in {start[at]:.2g} s: in other units than kg m^2, or at the '
-               'screw?')
+def drive_errors(p: Parameters) -> Iterator[PossibleError]:
+    """Yield possible errors in the drives; without a screw lead nothing is known."""
+    return iter(()) if p.actuator.screw_lead is None or not p.drives else find_errors(
+        _TABLE, _Drives(p))

@@ -17,28 +17,18 @@ derivative at angle zero, too, and loses no digits there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.core.binding import function
-from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
-from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
-from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.kinematics.joint_axes import AXES
-from stewart_dynamics.mechanics.limits import ANGLES, OF_JOINTS
+from stewart_dynamics.mechanics.limits import OF_JOINTS
 from stewart_dynamics.mechanics.rows import JOINT_ANGLES
 from stewart_dynamics.parameters.table import Parameters
-
-
-# No ball joint or universal joint reaches this angle, 92 degrees [rad].
-_WIDEST = 1.6
-# A larger angle between a leg and its axis at home is a possible error [rad].
-_AWAY = 0.5 * math.pi
 
 
 class JointAngles:
@@ -78,33 +68,3 @@ def angles_to_check(parameters: Parameters, limits: Sequence[str]) -> JointAngle
     """Return the angles that the given joint limits need; None without joint limits."""
     needed = [axes for axes, limit in zip(AXES, OF_JOINTS, strict=True) if limit in limits]
     return JointAngles(parameters, needed) if needed else None
-
-
-def likely_mistakes(parameters: Parameters) -> Iterator[str]:
-    """Yield possible errors in the joints' limits and axes, each in one line."""
-    for name in OF_JOINTS:
-        bounds = parameters[name]
-        if bounds is not None and bounds.max() > _WIDEST:
-            yield (f'{name}: {bounds.max():.3g} rad, {math.degrees(bounds.max()):.0f} degrees: '
-                   'more than any joint of a leg: in degrees?')
-    given = [axes for axes in AXES if parameters[axes] is not None]
-    if not given:
-        return  # the angles at home are zero
-    try:
-        home = Motion.from_pose(home_pose(parameters)).rows
-    except ParameterError:
-        return  # without a home pose
-    angles = JointAngles(parameters, given)(home[None])[0]
-    for axes, (limit, where) in zip(AXES, ANGLES.items(), strict=True):
-        if axes not in given:
-            continue
-        at_home, bounds = angles[where], parameters[limit]
-        leg = int(np.argmax(at_home if bounds is None else at_home - bounds))
-        joint, angle = parameters.joints[leg], at_home[leg]
-        if angle > _AWAY:
-            yield (f'{axes}: at home {joint} is {angle:.3g} rad from it: does it point from the '
-                   'platform to the base, is the platform on the other side of the base '
-                   '(geometry.platform_side), or are the legs in another order?')
-        elif bounds is not None and angle > bounds[leg]:
-            yield (f'{limit}: {bounds[leg]:.3g} rad, but at home {joint} is {angle:.3g} rad from '
-                   f'its axis in {axes}')

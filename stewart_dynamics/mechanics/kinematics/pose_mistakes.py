@@ -4,14 +4,15 @@
 """
 The possible error in a pose that the hexapod cannot have: the one without which it can.
 
-A pose may be counted from home, its position in mm, its quaternion in the order w x y z. Each is a
-hypothesis: the pose without the mistake has all legs within their limits, and det(J) has the sign
-that it has at home. Angles may be in degrees if even half of them could not be reached in radians.
+A pose may be counted from home, its position in mm, its quaternion in the order w x y z; the
+joints of one body may be given in the frame of the other. Each is a transform: the pose without the error has
+all legs within their limits, and det(J) has the sign that it has at home. Angles may be in degrees
+if even half of them could not be reached in radians.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import combinations
 import math
@@ -40,9 +41,15 @@ _FAR = 2.0
 # Angles of which one is as large may be in degrees, whatever half of them reaches.
 _TILTED = 1.0
 
-_MM, _FROM_HOME, _W_FIRST, IN_DEGREES = (
+# Joints of one body are in the frame of the other one if they are this far from the origin of
+# theirs, in terms of the longest leg.
+_OTHER_FRAME = 0.3
+
+# The simplest first.
+_MM, _FROM_HOME, _W_FIRST, IN_DEGREES, _BASE, _PLATFORM = _KNOWN = (
     'position in mm', 'a pose counted from home', 'a quaternion in the order w x y z',
-    'angles in degrees')
+    'angles in degrees', 'geometry.base_joints in the platform frame',
+    'geometry.platform_joints in the base frame')
 
 
 class Angles(NamedTuple):
@@ -99,28 +106,31 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
         turns = angles is not None and angles.largest > math.pi  # no platform turns so far
         if not turns and is_possible(position, rotation):
             return ''
-        known = _MM, _FROM_HOME, _W_FIRST if angles is None else IN_DEGREES
-        # The fewest mistakes first.
-        for each in (each for number in (1, 2, 3) for each in combinations(known, number)):
-            at, turned = position, rotation
-            if _MM in each:
-                if np.linalg.norm(at) < _FAR * longest.max():
-                    continue  # in m it is not far off, in mm it is hardly a motion
-                at = _MILLIMETRE * at
-            if _W_FIRST in each:
-                w, x, y, z = to_quaternion(turned).tolist()
-                if 2.0 * w * w < 1.0:
-                    continue  # no platform turns so far
-                turned = np.reshape(from_quaternion(x, y, z, w), (3, 3))
-            if IN_DEGREES in each:
-                if angles is None or angles.largest < _TILTED and (
-                        angles.half is None or is_possible(at, angles.half)):
-                    continue  # such an angle is not far from those that are reached
-                turned = angles.in_degrees
-            if _FROM_HOME in each:
-                at, turned = home.position + at, turned @ home.rotation
-            if is_possible(at, turned):
-                return f'possible error: {" and ".join(each)}'
+        base, platform = (joints.mean(axis=0) for joints in (
+            parameters.geometry.base_joints, parameters.geometry.platform_joints))
+        far = _OTHER_FRAME * longest.max()
+        # Positions and rotations without an error; None where they do not look like it: in m a
+        # position is not far off, in mm hardly a motion; no platform turns by more than a quarter
+        # turn; an angle may be near those that are reached.
+        transforms: dict[str, Callable[[Array, Array], tuple[Array, Array] | None]] = {
+            _MM: lambda at, turned: None if np.linalg.norm(at) < _FAR * longest.max() else (
+                _MILLIMETRE * at, turned),
+            _W_FIRST: lambda at, turned: None if angles is not None or (
+                2.0 * (q := to_quaternion(turned).tolist())[0] ** 2 < 1.0) else (
+                at, np.reshape(from_quaternion(q[1], q[2], q[3], q[0]), (3, 3))),
+            IN_DEGREES: lambda at, _: None if angles is None or angles.largest < _TILTED and (
+                angles.half is None or is_possible(at, angles.half)) else (at, angles.in_degrees),
+            _FROM_HOME: lambda at, turned: (home.position + at, turned @ home.rotation),
+            _BASE: lambda at, turned: (at + base, turned) if np.linalg.norm(base) > far else None,
+            _PLATFORM: lambda at, turned: (
+                at - turned @ platform, turned) if np.linalg.norm(platform) > far else None}
+        # The fewest errors first.
+        for each in (each for number in (1, 2, 3) for each in combinations(_KNOWN, number)):
+            right: tuple[Array, Array] | None = (position, rotation)
+            for error, without in transforms.items():
+                right = without(*right) if right and error in each else right
+            if right and is_possible(*right):
+                return f'likely mistake: {" and ".join(each)}'
         return other_side(_legs(parameters, position, rotation)[1], at_home) if first else ''
 
 
