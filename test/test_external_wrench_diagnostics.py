@@ -13,12 +13,12 @@ from snapshot import Snapshot
 from stewart_dynamics import Motion
 from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
-from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, NEVER, OK, STALE, Status, StatusPart, WARN)
 from stewart_dynamics.node.diagnostics.outcomes import ExternalWrenchDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.input_messages import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
 from stewart_dynamics.setpoints.rejections import NOT_MEASURED, Rejection, Rejections
@@ -185,7 +185,7 @@ def test_a_rejection_is_reported_and_counted(snapshot: Snapshot) -> None:
 def test_a_likely_mistake_in_the_efforts_is_a_warning_while_it_is_there(
         what: str, snapshot: Snapshot) -> None:
     diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
-    mistaken = CLEAR._replace(mistake=LegMistake(what, 'all are wrong'))
+    mistaken = CLEAR._replace(mistake=PossibleError(what, 'all are wrong'))
     felt(diagnostics, 1.0, mistaken)
     felt(diagnostics, 1.1, mistaken)
     message = 'measured_legs: possible error: all are wrong' + (

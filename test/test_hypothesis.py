@@ -37,7 +37,8 @@ ANY = Hypothesis[File]('any', lambda f: f.force > 0.0, '{six[limits.force_max]:g
     (LARGE, [1.0, 20.0, 30.0, 2.0, np.nan, 10.0], ['force: 30 N at leg_3: in mN?']),
     (LARGE, 10.0, []), (LARGE, None, []), (LARGE, np.inf, ['force: inf N at leg_1: in mN?']),
     ((LARGE, ANY), 11.0, ['force: 11 N at leg_1: in mN?', 'any: 11']),
-    (First(LARGE, ANY), 11.0, ['force: 11 N at leg_1: in mN?']), (First(LARGE, ANY), 9.0, ['any: 9']),
+    (First(LARGE, ANY), 11.0, ['force: 11 N at leg_1: in mN?']),
+    (First(LARGE, ANY), 9.0, ['any: 9']),
     (First(When(lambda f: f.unit == 'kN', LARGE), (ANY, ANY)), 11.0, ['any: 11', 'any: 11']),
     ((lambda f: find_errors(ANY, f), ()), 1.0, ['any: 1'])])
 def test_errors_are_found_in_the_order_of_their_table(

@@ -21,7 +21,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.legs.calibrated import CalibratedLegs, ZeroStep
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
-from stewart_dynamics.reporting.estimates import LikelyMistake
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 
 # Logarithm of the likelihood ratio from which a step is named, and up to which others are named
 # beside it.
@@ -42,7 +42,7 @@ class _Likeliest(NamedTuple):
 
 
 def assembly_errors(legs: CalibratedLegs, values: Array, errors: Array, held: Flags,
-                    ) -> tuple[LikelyMistake, ...]:
+                    ) -> tuple[PossibleError, ...]:
     """
     Return the legs whose zeros are off by a step, the likeliest first.
 
@@ -52,7 +52,7 @@ def assembly_errors(legs: CalibratedLegs, values: Array, errors: Array, held: Fl
         return ()
     left = values[legs.zero] - legs.values()[legs.zero]
     known = np.where(np.isfinite(errors[legs.zero]), errors[legs.zero], 0.0)
-    found: list[tuple[float, LikelyMistake]] = []
+    found: list[tuple[float, PossibleError]] = []
     rest, open_legs = left.copy(), [*range(6)]
     while open_legs:
         best = max((_likeliest(legs, leg, left, rest, known) for leg in open_legs),
@@ -61,7 +61,7 @@ def assembly_errors(legs: CalibratedLegs, values: Array, errors: Array, held: Fl
             break
         rest[best.leg] = left[best.leg] - best.size
         open_legs.remove(best.leg)
-        found.append((best.evidence, LikelyMistake(
+        found.append((best.evidence, PossibleError(
             STEP if best.step.mounted else TURN, best.text)))
     return tuple(each for _, each in sorted(found, key=lambda each: -each[0]))
 

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.calibration.assembly_errors import assembly_errors, TURN
 from stewart_dynamics.calibration.calibration_mistakes import (
-    mistakes_of_input, mistakes_of_result, not_identified)
+    Measured, mistakes_of_input, mistakes_of_result, not_identified)
 from stewart_dynamics.calibration.equations import (
     chosen, DEVICE, Equations, Frames, GEOMETRY, GUIDED, held_by_groups, SAME, values_of,
     with_geometry)
@@ -38,8 +38,9 @@ from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.least_squares import Identifiability, LARGEST_SHARE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters, UNIVERSAL
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 from stewart_dynamics.reporting.estimates import (
-    FIXED, HOLD_OUT, IDENTIFIED, justified, LikelyMistake, states_of)
+    FIXED, HOLD_OUT, IDENTIFIED, justified, states_of)
 
 # Held-out poses are the middle ones of equal groups; below this number of others, no pose is.
 _FEWEST_OTHERS = 12
@@ -99,10 +100,10 @@ class Calibration(NamedTuple):
     after: Array
     outliers: tuple[Outlier, ...]
     validation: Validation | None
-    lack_of_fit: tuple[LikelyMistake, ...]
-    likely: tuple[LikelyMistake, ...]
+    lack_of_fit: tuple[PossibleError, ...]
+    likely: tuple[PossibleError, ...]
     """Mistakes that were accepted."""
-    assembly: tuple[LikelyMistake, ...]
+    assembly: tuple[PossibleError, ...]
     """Errors of the assembly that calibrated zeros show, which are in the values."""
     legs: CalibratedLegs
     """The numbers by name, unit and group."""
@@ -173,15 +174,15 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         held[chosen(legs, name)] = True
     if held.all() and not unknown:
         raise ParameterError('fixed: nothing is left to be calibrated')
-    likely: list[LikelyMistake] = []
+    likely: list[PossibleError] = []
 
-    def refuse(mistakes: Iterable[LikelyMistake]) -> None:
+    def refuse(mistakes: Iterable[PossibleError]) -> None:
         likely.extend(mistakes)
         if likely and not accept_mistakes:
             raise StewartError(
                 f'{likely[0].text}; nothing is calibrated (--accept-mistakes does)')
 
-    refuse(mistakes_of_input(p, measured, unknown, angles, degrees, millimeters))
+    refuse(mistakes_of_input(Measured(p, measured, unknown, angles, degrees, millimeters)))
     known = find_frames(p, measured) if unknown else SAME
     measured = measured._replace(frames=known)
     size = p.singularity.characteristic_length
@@ -197,7 +198,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         raise StewartError(f'{len(used.positions)} poses for {count} unknowns: '
                            f'at least {count // 6 + 1} are needed')
     if np.mean(sound) < 1.0 - MOST_OUTLIERS:
-        refuse([LikelyMistake(
+        refuse([PossibleError(
             'outliers', f'{np.sum(~sound)} of {len(sound)} poses do not fit the geometry that '
             f'fits all others: {p.leg_kind.position.field} and poses must be of the same '
             'instants, at rest')])
@@ -218,7 +219,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     before, after = (np.sqrt(np.mean(each ** 2, axis=0)) for each in (
         used.at(_with_frames(used, free, of_file)).residuals, found.lin.residuals))
     if IDENTIFIED not in states:
-        refuse([LikelyMistake(
+        refuse([PossibleError(
             'identifiable', 'no number is identifiable by itself, with residuals of '
             f'{1e3 * after.max():.3g} mm: {lack[0].text if lack else missing}')])
     validation = _validated(used, free, of_file, found, hold_out)
@@ -226,7 +227,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         errors_before, errors_after = (
             math.hypot(each.rms[0], size * each.rms[1]) for each in validation)
         if not errors_after < _WORSE * errors_before:
-            refuse([LikelyMistake(
+            refuse([PossibleError(
                 'worse', f'held-out poses are {_shown(validation.before)} off by the file, but '
                 f'{_shown(validation.after)} by a fit to the others: the poses do not support a '
                 'better geometry' + (f'; {lack[0].text}' if lack else ''))])

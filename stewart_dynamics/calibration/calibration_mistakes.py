@@ -4,15 +4,17 @@
 """
 Possible errors in measured poses, and numbers that these cannot distinguish.
 
-A mistake is likely if the poses fit the file's geometry, up to a constant of each leg, several
+An error is likely if the poses fit the file's geometry, up to a constant of each leg, several
 times better without it: a real error of the geometry does not do that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import combinations, product
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import product
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,23 +31,24 @@ from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
 from stewart_dynamics.parameters.table import AUTO, Parameters
-from stewart_dynamics.reporting.estimates import LikelyMistake
+from stewart_dynamics.possible_errors.hypothesis import likeliest, PossibleError
+from stewart_dynamics.possible_errors.transforms import swapped_pairs
 
-# A mistake is likely if the misfit without it is smaller than this part.
+# An error is likely if the misfit without it is smaller than this part.
 _BETTER = 0.25
-# No mistake explains poses with a larger misfit, and none shows in poses that move the drives less
+# No error explains poses with a larger misfit, and none shows in poses that move the drives less
 # than this part of their unit [m, rad].
 _EXPLAINED, _SAME = 0.7, 1e-6
 # Fewer poses have another unit of angles if the zeros are off by more than this [rad].
 _LARGE_TURN = 0.3
 # Cranks do not make more turns from zero.
 _MOST_TURNS = 2.0
-# Mistakes explain the poses alike if their misfits differ by this factor, or are below this value.
+# Errors explain the poses alike if their misfits differ by this factor, or are below this value.
 _ALIKE, _EXACT = 2.0, 1e-3
 # Largest scale of positions that is tried and how near, logarithms; a misfit above all others.
 _LARGEST_SCALE, _SCALE_STEP, _WORST = math.log(2.0), 1e-3, 1e3
 DEVICE_SCALE, LEG_SCALE = 'device', 'scale'
-# Fewer poses say nothing about mistakes that change the positions of a leg alike.
+# Fewer poses say nothing about errors that change the positions of a leg alike.
 _FEWEST = 4
 # A joint that moves by a larger part of the characteristic length is not of this hexapod.
 _FARTHEST = 0.3
@@ -53,44 +56,53 @@ _FARTHEST = 0.3
 _UNEXPLAINED = 0.03
 
 
-def mistakes_of_input(parameters: Parameters, equations: Equations, unknown_frames: bool,
-                      angles: Array | None, degrees: bool, millimeters: Millimeters,
-                      ) -> Iterator[LikelyMistake]:
-    """Yield the likeliest mistake in positions, poses or their angles (N, 3), if one is likely."""
+class Measured(NamedTuple):
+    """Positions of the drives and poses as they are given, with the options that read them."""
+
+    parameters: Parameters
+    equations: Equations
+    unknown_frames: bool
+    angles: Array | None  # of the poses (N, 3), in the unit as they were read
+    degrees: bool  # whether they, and positions that are angles, were read as degrees
+    millimeters: Millimeters
+
+    def misfit(self, equations: Equations, unknown_frames: bool | None = None) -> float:
+        """Return how far positions are from the file's, up to a constant, by their spread."""
+        unknown = self.unknown_frames if unknown_frames is None else unknown_frames
+        try:
+            known = equations._replace(frames=find_frames(
+                self.parameters, equations) if unknown else SAME)
+        except StewartError:
+            return math.inf
+        off, motions = _compared(known)
+        whole = max(map(_spread, motions))
+        return _spread(off) / whole if whole > 0.0 else math.inf
+
+
+def mistakes_of_input(measured: Measured) -> Iterator[PossibleError]:
+    """Yield the likeliest error in positions, poses or their angles, if one is likely."""
+    equations = measured.equations
     if len(equations.positions) < _FEWEST or not _moved(equations):
-        yield from _unit_of_few(equations, degrees)
-        yield from _on_other_side(parameters, equations, unknown_frames)
+        yield from _unit_of_few(equations, measured.degrees)
+        yield from _on_other_side(measured)
         return
-    given = _misfit(parameters, equations, unknown_frames)
-    without = list(_without_mistakes(
-        parameters, equations, millimeters, degrees, unknown_frames))
-    if angles is not None:
-        rotation = from_euler(angles if degrees else np.radians(angles))
-        text = ('the angles are in radians, not in degrees: without --degrees they are read so'
-                if degrees else
-                'the angles are in degrees, not in radians: --degrees reads them')
-        turned = [(LikelyMistake('degrees', text), equations), *(
-            (mistake._replace(text=f'{mistake.text}; {text}'), each)
-            for mistake, each in without if mistake.what == 'unit')]
-        without += [(mistake, each._replace(pose=Pose(each.pose.position, rotation)))
-                    for mistake, each in turned]
-    tried = [(_misfit(parameters, each, unknown_frames), mistake) for mistake, each in without]
-    if not unknown_frames:
-        tried.append((_misfit(parameters, equations, True), LikelyMistake(
+    given = measured.misfit(equations)
+    tried = [(measured.misfit(each), error) for error, each in _without_errors(measured)]
+    if not measured.unknown_frames:
+        tried.append((measured.misfit(equations, unknown_frames=True), PossibleError(
             'frames', 'the poses are not those of the platform frame in the base frame, but of '
             'other frames: --frames unknown calibrates them as well')))
-    best, mistake = min(tried, key=lambda each: each[0])
-    if best >= _BETTER * given:
-        tried = list(_of_scale(parameters, equations, unknown_frames)) or tried
-        best, mistake = min(tried, key=lambda each: each[0])
-    if best < min(_BETTER * given, _EXPLAINED):
-        # Symmetric hexapods: a mirrored frame is another order of the legs.
-        texts = [each.text for misfit, each in tried if misfit <= max(_ALIKE * best, _EXACT)]
-        yield mistake._replace(text=f'{"; or ".join(texts)} (misfit {best:.2g} of the motion'
-                               + (f' instead of {given:.2g}' if given < math.inf else '')
-                               + _likelihood(equations, best, given) + ')')
+    largest = min(_BETTER * given, _EXPLAINED)
+    # Symmetric hexapods: a mirrored frame is another order of the legs.
+    if found := likeliest(tried, largest, _ALIKE, _EXACT) or likeliest(
+            _of_scale(measured), largest, _ALIKE, _EXACT):
+        best, error = min(found, key=lambda each: each[0])
+        yield error._replace(text=(
+            f'{"; or ".join(each.text for _, each in found)} (misfit {best:.2g} of the motion'
+            + (f' instead of {given:.2g}' if given < math.inf else '')
+            + _likelihood(equations, best, given) + ')'))
     else:
-        yield from _on_other_side(parameters, equations, unknown_frames)
+        yield from _on_other_side(measured)
 
 
 def _moved(equations: Equations) -> bool:
@@ -99,7 +111,7 @@ def _moved(equations: Equations) -> bool:
     return max(map(_spread, motions)) > _SAME
 
 
-def _unit_of_few(equations: Equations, degrees: bool) -> Iterator[LikelyMistake]:
+def _unit_of_few(equations: Equations, degrees: bool) -> Iterator[PossibleError]:
     """Yield another unit of angles that a few poses, or one, show by the zeros they lead to."""
     if not equations.legs.signs:
         return
@@ -108,12 +120,12 @@ def _unit_of_few(equations: Equations, degrees: bool) -> Iterator[LikelyMistake]
                       for factor in (1.0, unit))
     largest = float(np.abs(equations.positions).max())
     if not degrees and given > _LARGE_TURN and by_unit < _BETTER * given:
-        yield LikelyMistake('unit', (
+        yield PossibleError('unit', (
             f'{_unit_words((1.0, unit), Millimeters(), degrees, equations)} (zeros are then '
             f'{math.degrees(by_unit):.2g} deg from those of the file, root mean square, instead '
             f'of {math.degrees(given):.2g} deg)'))
     elif largest > _MOST_TURNS * 2.0 * math.pi:
-        yield LikelyMistake('unit', (
+        yield PossibleError('unit', (
             f'{_name_of(equations)} are up to {largest:.3g} rad, {largest / (2.0 * math.pi):.3g} '
             'turns: likely degrees, pulses or increments'))
 
@@ -127,18 +139,18 @@ def _from_file(equations: Equations) -> float:
 
 
 def _likelihood(equations: Equations, best: float, given: float) -> str:
-    """Return how much likelier positions without a mistake are, in words; may be empty."""
+    """Return how much likelier positions without an error are, in words; may be empty."""
     count = equations.positions.size - 12  # less the middle and the scatter of each leg
     if not equations.legs.signs or not 0.0 < best < given < math.inf or count < 1:
         return ''
     return f', {times_as_likely(count * math.log(given / best))} as likely'
 
 
-def _of_scale(parameters: Parameters, equations: Equations, unknown_frames: bool,
-              ) -> Iterator[tuple[float, LikelyMistake]]:
-    """Yield the smallest misfit of positions, or leg positions, of any scale, and the mistake."""
+def _of_scale(measured: Measured) -> Iterator[tuple[float, PossibleError]]:
+    """Yield the smallest misfit of positions, or leg positions, of any scale, and the error."""
     from scipy.optimize import minimize_scalar
 
+    equations = measured.equations
     positions, pose = equations.positions, equations.pose
     for what, words, scaled in (
             (DEVICE_SCALE, 'positions of the device are {:.3g} times as large as they are by the '
@@ -148,52 +160,51 @@ def _of_scale(parameters: Parameters, equations: Equations, unknown_frames: bool
              f'device: {equations.legs.scale_words}', lambda factor: equations._replace(
                  positions=positions / factor))):
         found = minimize_scalar(
-            lambda logarithm, scaled=scaled: min(_misfit(
-                parameters, scaled(math.exp(logarithm)), unknown_frames), _WORST),
+            lambda logarithm, scaled=scaled: min(
+                measured.misfit(scaled(math.exp(logarithm))), _WORST),
             bounds=(-_LARGEST_SCALE, _LARGEST_SCALE), method='bounded',
             options={'xatol': _SCALE_STEP})
         if abs(found.x) > _LARGEST_SCALE - 10.0 * _SCALE_STEP:
             continue  # any larger one would do: poses that do not determine the frames
-        yield float(found.fun), LikelyMistake(what, words.format(math.exp(found.x)))
+        yield float(found.fun), PossibleError(what, words.format(math.exp(found.x)))
 
 
-def _on_other_side(parameters: Parameters, equations: Equations, unknown_frames: bool,
-                   ) -> Iterator[LikelyMistake]:
-    """Yield a mistake if the platform is on the other side of its base, where lengths can fit."""
+def _on_other_side(measured: Measured) -> Iterator[PossibleError]:
+    """Yield an error if the platform is on the other side of its base, where lengths can fit."""
+    p, equations = measured.parameters, measured.equations
     try:
-        frames = find_frames(parameters, equations) if unknown_frames else SAME
+        frames = find_frames(p, equations) if measured.unknown_frames else SAME
     except StewartError:
         return
     pose = equations.in_base(frames)
     with np.errstate(invalid='ignore'):  # poses out of reach
         determinants = lagrange.determinant(
-            lagrange.unchecked_legs(parameters, pose.position, pose.rotation))
-    if np.median(determinants) * determinant_at_home(parameters) < 0.0:
-        yield LikelyMistake(
+            lagrange.unchecked_legs(p, pose.position, pose.rotation))
+    if np.median(determinants) * determinant_at_home(p) < 0.0:
+        side = p.geometry.platform_side
+        yield PossibleError(
             'side', 'the poses are on the other side of the base than at home: likely a mirrored '
-            '(left-handed) frame, with one axis of the opposite sign'
-            + ('; or geometry.platform_side, which is not given'
-               if parameters.geometry.platform_side == AUTO else
-               f'; or geometry.platform_side, {parameters.geometry.platform_side}, is wrong'))
+            '(left-handed) frame, with one axis of the opposite sign; or geometry.platform_side, '
+            + ('which is not given' if side == AUTO else f'{side}, is wrong'))
 
 
 def mistakes_of_result(legs: CalibratedLegs, values: Array, residuals: Array, size: float,
-                       ) -> Iterator[LikelyMistake]:
+                       ) -> Iterator[PossibleError]:
     """Yield possible errors that show in calibrated values and their residuals (N, 6)."""
     parameters = legs.parameters
     left = float(np.sqrt(np.mean(residuals ** 2)))
     if left > _UNEXPLAINED * size:
-        yield LikelyMistake('misfit', f'no geometry explains the poses: residuals of {_mm(left)} '
+        yield PossibleError('misfit', f'no geometry explains the poses: residuals of {_mm(left)} '
                             'mm remain; lengths and poses must be of the same instants')
     start, joints = values_of(legs), parameters.joints
     moved = np.linalg.norm((values - start)[:PLATFORM.stop].reshape(12, 3), axis=1)
     if moved.max() > _FARTHEST * size:
         worst = int(np.argmax(moved))
         where = 'base' if worst < BASE.stop // 3 else 'platform'
-        yield LikelyMistake('far', f'the {where} joint of {joints[worst % 6]} would move by '
+        yield PossibleError('far', f'the {where} joint of {joints[worst % 6]} would move by '
                             f'{_mm(moved[worst])} mm: the poses are not those of this hexapod')
     for what, text in legs.mistakes_of(values, size):
-        yield LikelyMistake(what, text)
+        yield PossibleError(what, text)
 
 
 def _name_of(equations: Equations) -> str:
@@ -202,72 +213,88 @@ def _name_of(equations: Equations) -> str:
     return 'leg positions' if kind.position.unit == 'm' else f'{kind.position.field} of the legs'
 
 
-def _without_mistakes(parameters: Parameters, given: Equations, millimeters: Millimeters,
-                      degrees: bool, unknown_frames: bool,
-                      ) -> Iterator[tuple[LikelyMistake, Equations]]:
-    """Yield mistakes, each with the measurements as they were without it."""
-    lengths, pose, legs = given.positions, given.pose, given.legs
-    unit, = legs.units.values()
-    for of_positions, of_legs in product((1.0, 1e-3, 1e3), (1.0, unit, round(1.0 / unit, 9))):
-        if (of_positions, of_legs) != (1.0, 1.0):
-            words = _unit_words((of_positions, of_legs), millimeters, degrees, given)
-            yield LikelyMistake('unit', words), given._replace(
-                positions=of_legs * lengths,
-                pose=Pose(of_positions * pose.position, pose.rotation))
-    for axis, name in enumerate('xyz'):
-        mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
-        yield LikelyMistake(
-            'mirrored', f'the poses are of a mirrored (left-handed) frame: {name} has the '
-            'opposite sign'), given._replace(pose=Pose(
-                mirror * pose.position, mirror[:, None] * pose.rotation * mirror))
-    q = to_quaternion(pose.rotation)
-    yield LikelyMistake('quaternion', 'quaternions have w first, not last'), given._replace(
-        pose=Pose.from_quaternion(pose.position, np.roll(q, -1, axis=1)))
-    yield LikelyMistake(
-        'inverse', 'the poses are those of the base in the platform frame: the inverse is needed',
-    ), given._replace(pose=inverse(pose))
-    yield LikelyMistake(
-        'inverse', 'the rotations are those of the base in the platform frame: the inverse is '
-        'needed'), given._replace(pose=Pose(pose.position, np.swapaxes(pose.rotation, 1, 2)))
-    yield LikelyMistake('sign', f'{_name_of(given)} have the opposite sign'
-                        + ('' if legs.signs else ': they must increase as a leg extends')), (
-        given._replace(positions=-lengths))
-    joints = parameters.joints
-    orders = [('swapped', f'{joints[a]} and {joints[b]} are swapped', [
-        {a: b, b: a}.get(leg, leg) for leg in range(6)]) for a, b in combinations(range(6), 2)]
+def _mirrored(mirror: Array, pose: Pose) -> Pose:
+    """Return poses of a frame with axes of the opposite sign (3,)."""
+    return Pose(mirror * pose.position, mirror[:, None] * pose.rotation * mirror)
+
+
+# Errors of poses, and the poses without them.
+_POSES: tuple[tuple[str, str, Callable[[Pose], Pose]], ...] = (
+    *(('mirrored', 'the poses are of a mirrored (left-handed) frame: '
+       f'{name} has the opposite sign', partial(_mirrored, mirror)) for name, mirror in zip(
+        'xyz', 1.0 - 2.0 * np.eye(3), strict=True)),
+    ('quaternion', 'quaternions have w first, not last', lambda pose: Pose.from_quaternion(
+        pose.position, np.roll(to_quaternion(pose.rotation), -1, axis=1))),
+    ('inverse', 'the poses are those of the base in the platform frame: the inverse is needed',
+     inverse),
+    ('inverse', 'the rotations are those of the base in the platform frame: the inverse is '
+     'needed', lambda pose: Pose(pose.position, np.swapaxes(pose.rotation, 1, 2))))
+
+
+def _orders(joints: Sequence[str]) -> Iterator[tuple[str, list[int]]]:
+    """Yield other orders of the legs, in words."""
+    for a, b, order in swapped_pairs():
+        yield f'{joints[a]} and {joints[b]} are swapped', order
     for turn in range(6):
         rolled = [*range(turn, 6), *range(turn)]
         for order in (rolled, rolled[::-1]):
-            names = ', '.join(joints[n] for n in order)
-            orders.append(('swapped', f'the legs are in another order: {names}', order))
-    for what, text, order in orders:
-        yield LikelyMistake(what, text), given._replace(positions=lengths[:, order])
+            yield f'the legs are in another order: {", ".join(joints[n] for n in order)}', order
+
+
+def _without_errors(measured: Measured) -> Iterator[tuple[PossibleError, Equations]]:
+    """Yield possible errors, each with the measurements as they were without it."""
+    given, degrees = measured.equations, measured.degrees
+    lengths, pose, legs = given.positions, given.pose, given.legs
+    unit, = legs.units.values()
+    turned = None if measured.angles is None else from_euler(
+        measured.angles if degrees else np.radians(measured.angles))
+    of_angles = ('the angles are in radians, not in degrees: without --degrees they are read so'
+                 if degrees else 'the angles are in degrees, not in radians: --degrees reads them')
+    for of_positions, of_legs in product((1.0, 1e-3, 1e3), (1.0, unit, round(1.0 / unit, 9))):
+        words = '' if of_positions == of_legs == 1.0 else _unit_words(
+            (of_positions, of_legs), measured.millimeters, degrees, given)
+        scaled, position = given._replace(
+            positions=of_legs * lengths), of_positions * pose.position
+        if words:
+            yield PossibleError('unit', words), scaled._replace(
+                pose=Pose(position, pose.rotation))
+        if turned is not None:
+            yield PossibleError('unit' if words else 'degrees', (
+                f'{words}; {of_angles}' if words else of_angles)), scaled._replace(
+                    pose=Pose(position, turned))
+    for what, words, without in _POSES:
+        yield PossibleError(what, words), given._replace(pose=without(pose))
+    yield PossibleError('sign', f'{_name_of(given)} have the opposite sign'
+                        + ('' if legs.signs else ': they must increase as a leg extends')), (
+        given._replace(positions=-lengths))
+    orders = [*_orders(legs.parameters.joints)]
+    for text, order in orders:
+        yield PossibleError('swapped', text), given._replace(positions=lengths[:, order])
     if not legs.signs:
         return
-    if unknown_frames:
+    if measured.unknown_frames:
         for leg in range(6):
             yield _reversed(given, [leg])
         return
-    for what, text, order in [('', '', [*range(6)]), *(
-            each for each in orders if each[2] != [*range(6)])]:
+    for text, order in [('', [*range(6)]), *(each for each in orders if each[1] != [*range(6)])]:
         ordered = given._replace(positions=lengths[:, order])
         other_way = ordered._replace(positions=-ordered.positions)
         better = np.flatnonzero(
             _deviations(other_way) < _BETTER * _deviations(ordered)).tolist()
         if better and len(better) < 6:
-            mistake, equations = _reversed(ordered, better)
-            yield (mistake._replace(what=what, text=f'{text}, and {mistake.text}') if what else
-                   mistake), equations
+            error, equations = _reversed(ordered, better)
+            yield (PossibleError('swapped', f'{text}, and {error.text}') if text else error), (
+                equations)
 
 
-def _reversed(given: Equations, legs: Sequence[int]) -> tuple[LikelyMistake, Equations]:
-    """Return the mistake that drives turn the other way, and the positions without it."""
+def _reversed(given: Equations, legs: Sequence[int]) -> tuple[PossibleError, Equations]:
+    """Return the error that drives turn the other way, and the positions without it."""
     positions = given.positions.copy()
     positions[:, legs] *= -1.0
     names = listed([given.legs.parameters.joints[leg] for leg in legs])
     field = given.legs.parameters.leg_kind.position.field
     turn = 'turns' if len(legs) == 1 else 'turn'
-    return LikelyMistake(
+    return PossibleError(
         'reversed', f'{names} {turn} the other way: {field} of the opposite sign'), given._replace(
             positions=positions)
 
@@ -314,18 +341,6 @@ def _length_words(factors: tuple[float, float], given: Millimeters) -> str:
     else:
         hint = f': {option} reads them so' if not now else f': {option} in place of {now}'
     return '; '.join(f'{" and ".join(names)} {text}' for text, names in wrong.items()) + hint
-
-
-def _misfit(parameters: Parameters, equations: Equations, unknown_frames: bool) -> float:
-    """Return how far positions are from the file's, up to a constant, by their spread."""
-    try:
-        known = equations._replace(frames=find_frames(
-            parameters, equations) if unknown_frames else SAME)
-    except StewartError:
-        return math.inf
-    off, motions = _compared(known)
-    whole = max(map(_spread, motions))
-    return _spread(off) / whole if whole > 0.0 else math.inf
 
 
 def _spread(positions: Array) -> float:

@@ -35,7 +35,7 @@ from stewart_dynamics.calibration.noise import covariances, whitening
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.reporting.estimates import LikelyMistake
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 
 # Something is named if its Bayes factor against noise is larger; its cause, if the Bayes factor
 # against every other cause is larger than the second.
@@ -173,7 +173,7 @@ class _Cause(NamedTuple):
 
 
 def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unknowns: Unknowns,
-                fixed: Flags, whitened: Array | None) -> tuple[LikelyMistake, ...]:
+                fixed: Flags, whitened: Array | None) -> tuple[PossibleError, ...]:
     """
     Return the causes of residuals that are more than noise, the likeliest first.
 
@@ -217,14 +217,14 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
     legs_of_file = equations.legs
     words = {'scale': legs_of_file.scale_cause, 'short': legs_of_file.scale_short,
              'force': legs_of_file.force_words}
-    lacks = [LikelyMistake(what, f'{_LACKS[what].format_map(words)}: ' + ', '.join(
+    lacks = [PossibleError(what, f'{_LACKS[what].format_map(words)}: ' + ', '.join(
         text for each, text in causes if each == what))
         for what in dict.fromkeys(what for what, _ in causes)]
     if whitened is not None and not lacks:
         rest = max(whitened.size - found.identifiability.rank, 1)
         square = float(np.sum(whitened ** 2))
         if chi2.sf(square, rest) < _PROBABILITY:
-            lacks.append(LikelyMistake(_NOISE, 'the residuals are '
+            lacks.append(PossibleError(_NOISE, 'the residuals are '
                                        f'{math.sqrt(square / rest):.2g} times the noise that was '
                                        'given'))
     return tuple(lacks)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from functools import partial
-import itertools
 import math
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.messages.stamp_order import NO_STAMP
 from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE
+from stewart_dynamics.possible_errors.transforms import axes_and_signs
 from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import check_stamp, Rejections
 
@@ -162,13 +162,12 @@ def _mistake_of_rates(blocks: Array, kind: str, words: str) -> str:
         return f'angular_velocity is {1.0 / factor:.0f} times the turning of gravity: {degrees}'
     share = share if factor > 0.0 else 0.0
     # Fewest changes first: where gravity does not turn about an axis, its sign is not known.
-    for axes in sorted(itertools.permutations(range(3)), key=lambda each: each != (0, 1, 2)):
-        for signs in sorted(itertools.product((1.0, -1.0), repeat=3), key=sum, reverse=True):
-            other, factor = fit(axes, signs)
-            if (other > max(_EXPLAINED, share + _BETTER) and _SAME[0] < factor < _SAME[1]):
-                return 'angular_velocity: gravity turns as by x y z = ' + ' '.join(
-                    f'{"-" * (sign < 0.0)}{"xyz"[axis]}' for axis, sign in zip(
-                        axes, signs, strict=True)) + ' of it: axes swapped, or of another sign'
+    for axes, signs in axes_and_signs():
+        other, factor = fit(axes, signs)
+        if other > max(_EXPLAINED, share + _BETTER) and _SAME[0] < factor < _SAME[1]:
+            return 'angular_velocity: gravity turns as by x y z = ' + ' '.join(
+                f'{"-" * (sign < 0.0)}{"xyz"[axis]}' for axis, sign in zip(
+                    axes, signs, strict=True)) + ' of it: axes swapped, or of another sign'
     return ''
 
 

@@ -15,8 +15,9 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import SECOND, Six
-from stewart_dynamics.mechanics.drives.measured_efforts import EffortSums, LegMistake
+from stewart_dynamics.mechanics.drives.measured_efforts import EffortSums
 from stewart_dynamics.parameters.table import OF_DRIVES, Parameters
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 
 # Length of a block [ns]; the first ones are shorter, of 1, 2, 4, ... measurements.
 _BLOCK = SECOND // 10
@@ -35,8 +36,8 @@ class EffortCheck:
         self._right = 0
         self._begin()
         self._shortest = 1
-        self.mistake: LegMistake | None = None
-        """The possible error; None without one."""
+        self.mistake: PossibleError | None = None
+        """The likely mistake; None without one."""
 
     def _begin(self) -> None:
         self._count, self._since = 0, 0

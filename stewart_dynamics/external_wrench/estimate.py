@@ -48,7 +48,7 @@ from stewart_dynamics.arrays import Array, NANOSECOND, NO_WRENCH, SECOND, Six
 from stewart_dynamics.core.binding import CODES, function, Sample
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.legs.kind import Named
-from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake
+from stewart_dynamics.mechanics.drives.measured_efforts import SCALE
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
@@ -56,6 +56,7 @@ from stewart_dynamics.mechanics.rows import (
     NO_BASE, PARTS_OF_WRENCH, POSE, POSITION, ROTATION, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 
 # Under the node's name.
 EXTERNAL_WRENCH = 'external_wrench'
@@ -97,12 +98,12 @@ class Estimate(NamedTuple):
     """Measured - model efforts, not filtered (6); none of the first measurement."""
     base: tuple[float, ...] = NO_BASE  # a row of the base's motion; of nan: it is still
     overloads: tuple[Overload, ...] = ()
-    mistake: LegMistake | None = None  # possible error in the measurements
+    mistake: PossibleError | None = None  # likely mistake in the measurements
 
     @property
     def published(self) -> Six | None:
         """Return the wrench; None without one, or where it likely is that of a mistake."""
-        return self.wrench if self.mistake is None or self.mistake.leaves_wrench else None
+        return self.wrench if self.mistake is None or self.mistake.what == SCALE else None
 
     @property
     def force(self) -> float:

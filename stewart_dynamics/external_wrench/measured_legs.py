@@ -22,12 +22,13 @@ from stewart_dynamics.external_wrench.estimate import (
     Estimate, ExternalWrench, Measurement, Target)
 from stewart_dynamics.external_wrench.rate_check import RateCheck
 from stewart_dynamics.mechanics.drives.measured_efforts import (
-    force_per_effort, has_losses, LegMistake, STAMPS, without_losses)
+    force_per_effort, has_losses, STAMPS, without_losses)
 from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, NO_BASE, TWIST, WRENCH
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
 from stewart_dynamics.messages.stamp_order import NO_STAMP
 from stewart_dynamics.parameters.table import MOTOR_CURRENTS, MOTOR_TORQUES, Parameters
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.rejections import (
@@ -166,10 +167,10 @@ class MeasuredLegs:
         return self._last.motion if self._last else None
 
     @property
-    def mistake(self) -> LegMistake | None:
-        """Possible error in stamps, velocities or efforts: the former may look like the latter."""
+    def mistake(self) -> PossibleError | None:
+        """Likely mistake in stamps, velocities or efforts: the former may look like the latter."""
         if self._stamps.present is not None:
-            return LegMistake(STAMPS, self._stamps.present[0])
+            return PossibleError(STAMPS, self._stamps.present[0])
         return self._rates.mistake or self._efforts.mistake
 
     def use(self, parameters: Parameters, step: ExternalWrench) -> None:

@@ -12,14 +12,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from itertools import permutations
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND
 from stewart_dynamics.external_wrench.estimate import Estimate, Measurement
-from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake, RATE
+from stewart_dynamics.mechanics.drives.measured_efforts import RATE
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
+from stewart_dynamics.possible_errors.transforms import best_order
 from stewart_dynamics.setpoints.consistency import Consistency
 from stewart_dynamics.setpoints.inconsistency import factor_words, VELOCITY
 
@@ -38,8 +39,8 @@ class RateCheck:
         self._joints, self._unit = parameters.joints, parameters.leg_kind.rate.unit
         self._consistency = Consistency(parameters.singularity.characteristic_length, None)
         self._recent: deque[Measurement] = deque(maxlen=_RECENT)
-        self.mistake: LegMistake | None = None
-        """The possible error; None without one."""
+        self.mistake: PossibleError | None = None
+        """The likely mistake; None without one."""
 
     def add(self, measurement: Measurement, estimate: Estimate) -> None:
         """Add a measurement, and the estimate from it; one without a wrench is a restart."""
@@ -55,7 +56,7 @@ class RateCheck:
         elif self.mistake is None:
             reasons = [each.reason for each in found.values()]
             late = next((each for each in reasons if each.endswith(('late?', 'early?'))), '')
-            self.mistake = LegMistake(RATE, _words(
+            self.mistake = PossibleError(RATE, _words(
                 list(self._recent), self._joints, late, self._unit))
 
 
@@ -101,9 +102,6 @@ def _reason(expected: Array, given: Array, step: float) -> str:
 
 def _order(expected: Array, given: Array) -> Sequence[int]:
     """Return the legs of which the velocities are, if they are in another order."""
-    squares = np.sum((given[:, :, None] - expected[:, None, :]) ** 2, axis=0)
-    orders = np.array(list(permutations(range(6))))
-    sums = squares[np.arange(6), orders].sum(axis=1)
-    best = int(np.argmin(sums))
-    explained = sums[best] < _EXPLAINED * np.sum(expected ** 2)
-    return orders[best].tolist() if explained and best else []
+    order, left = best_order(np.sum((given[:, :, None] - expected[:, None, :]) ** 2, axis=0))
+    explained = left < _EXPLAINED * np.sum(expected ** 2)
+    return order if explained and order != [*range(6)] else []

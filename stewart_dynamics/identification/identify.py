@@ -42,7 +42,7 @@ from stewart_dynamics.mechanics.kinematics.home_pose import home_of
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import FIXED, NEGATIVE, Parameters
-from stewart_dynamics.reporting.estimates import LikelyMistake
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 from stewart_dynamics.tables.reading import is_table
 
 # Minimum number of samples per cut-off period; slowly sampled bags get a lower cut-off.
@@ -132,7 +132,7 @@ class Identified:
     unsound: int  # number left out before it: outliers in samples, end stops, force limits
     residuals: Residuals
     validation: Residuals | None  # residuals on held-out time, by a fit to the rest
-    likely: tuple[LikelyMistake, ...]
+    likely: tuple[PossibleError, ...]
     lack_of_fit: LackOfFit | None  # None if the residuals are noise, or not tested
     tested: bool  # for a lack of fit: the bags are long enough
 
@@ -475,7 +475,7 @@ class Identification:
         return found
 
     def _validation(self, found: Fit, noisy: Noisy,
-                    ) -> tuple[Residuals | None, list[LikelyMistake]]:
+                    ) -> tuple[Residuals | None, list[PossibleError]]:
         """
         Return the residuals at the end of each bag with a fit to the rest, and a possible error.
 

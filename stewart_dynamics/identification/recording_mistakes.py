@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from copy import copy
-from itertools import combinations
 import math
 
 import numpy as np
@@ -30,7 +29,8 @@ from stewart_dynamics.mechanics.drives.measured_efforts import (
     FAR, known_scales, mistake_of_scale)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.reporting.estimates import LikelyMistake
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
+from stewart_dynamics.possible_errors.transforms import swapped_pairs
 
 # A residual above this fraction of the efforts starts the search for swapped legs.
 _SUSPICIOUS = 0.03
@@ -136,18 +136,18 @@ def of_no_pose(p: Parameters, positions: Array) -> str:
     return f'{text}: likely {kind.zero_cause.no_pose}'
 
 
-def of_delay(delays: Iterable[float]) -> Iterator[LikelyMistake]:
-    """Yield a possible error for bags with these delays of the efforts [s]."""
+def of_delay(delays: Iterable[float]) -> Iterator[PossibleError]:
+    """Yield a likely mistake for bags with these delays of the efforts [s]."""
     longest = max(delays, key=abs)
     if abs(longest) >= LONGEST_LAG:
-        yield LikelyMistake(
+        yield PossibleError(
             'delay', f'the efforts are {"later" if longest > 0.0 else "earlier"} than the '
             f'positions by {LONGEST_LAG:g} s or more: '
             'stamps of both must be of one clock')
 
 
-def of_efforts(comparison: Comparison, p: Parameters, of_motors: bool) -> Iterator[LikelyMistake]:
-    """Yield a possible error in sign or unit of the efforts."""
+def of_efforts(comparison: Comparison, p: Parameters, of_motors: bool) -> Iterator[PossibleError]:
+    """Yield a likely mistake in sign or unit of the efforts."""
     scales = comparison.best_scales()
     if scales[0] == 0.0:
         likeliest = 0.0
@@ -161,12 +161,12 @@ def of_efforts(comparison: Comparison, p: Parameters, of_motors: bool) -> Iterat
                  if 1.0 / FAR < each / likeliest < FAR and comparison.relative(each) < _WELL]
         likeliest = min(known, key=comparison.misfit, default=likeliest)
     if mistake := mistake_of_scale(likeliest, p, of_motors):
-        yield LikelyMistake(*mistake)
+        yield PossibleError(*mistake)
 
 
 def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit,
            lack: LackOfFit | None, residual: float, delays: Sequence[float],
-           ) -> Iterator[LikelyMistake]:
+           ) -> Iterator[PossibleError]:
     """
     Yield a possible error if the residuals are more than noise, or a delay is long.
 
@@ -190,23 +190,23 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
                  if now - each[0] > _CLEARLY and each[0] < (min(_BETTER, left) ** 2) * now]
     if swaps:
         misfit, which, a, b = min(swaps)
-        yield LikelyMistake(
+        yield PossibleError(
             'swapped', f'the {which} of {p.joints[a]} and {p.joints[b]} look swapped: the '
             f'residual becomes {math.sqrt(misfit / now):.2f} times as large')
     elif late:
         yield from late
     elif (lack is not None and lack.cause == p.leg_kind.zero_cause.what
           and lack.ranked[0].columns == 6):
-        yield LikelyMistake(
+        yield PossibleError(
             lack.cause, f'{p.leg_kind.zero_cause.subject} looks wrong: {lack.text}')
     elif residual > _UNEXPLAINED:
-        yield LikelyMistake(
+        yield PossibleError(
             'misfit', f'the residual is {100.0 * residual:.0f} % of the efforts whatever the '
             'parameters: positions and efforts may not belong together, or the geometry is wrong')
 
 
 def of_validation(before: Array, after: Array, measured: Array, deviation: float, unit: str,
-                  ) -> Iterator[LikelyMistake]:
+                  ) -> Iterator[PossibleError]:
     """
     Yield a possible error if the file predicts held-out efforts better than the fit.
 
@@ -215,7 +215,7 @@ def of_validation(before: Array, after: Array, measured: Array, deviation: float
     file, fitted, size = (math.sqrt(float(np.mean(each ** 2))) for each in (
         before, after, measured))
     if fitted > math.hypot(_WORSE * file + LEFT_BY_FILTERS * size, 2.0 * deviation):
-        yield LikelyMistake(
+        yield PossibleError(
             'validation', f'on held-out time the residual is {file:.3g} {unit} by the file and '
             f'{fitted:.3g} {unit} by a fit to the rest: the file is better; the model does not '
             'hold in a part of the recording')
@@ -240,9 +240,7 @@ def _swaps(platform: StewartPlatform, tried: Sequence[tuple[Extract, float]],
 
     own: the extracts without a swap, as ``_of_legs`` returns them.
     """
-    for a, b in combinations(range(6), 2):
-        order = list(_LEGS)
-        order[a], order[b] = b, a
+    for a, b, order in swapped_pairs():
         others = [_of_legs(platform, extract, order, unknowns) for extract, _ in tried]
         for which, extracts, of_efforts in (('positions and efforts', others, order),
                                             ('efforts', own, order), ('positions', others, _LEGS)):

@@ -23,6 +23,7 @@ from stewart_dynamics.external_wrench.estimate import (
     EXTERNAL_WRENCH, ExternalWrench, Target)
 from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs)
+from stewart_dynamics.mechanics.drives.measured_efforts import SCALE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import stamp_of
 from stewart_dynamics.node.diagnostics.levels import LogLine, WARN
@@ -331,8 +332,8 @@ class DynamicsNode(ManagedNode[Parameters]):
         if silence := self._diagnostics.external_wrench.silence(time.monotonic()):
             return payload.PayloadOutcome(silence)
         mistake = self._measured_legs.mistake
-        if mistake is not None and not mistake.leaves_wrench:
-            return payload.PayloadOutcome(f'possible error: {mistake.text}')
+        if mistake is not None and mistake.what != SCALE:
+            return payload.PayloadOutcome(f'likely mistake: {mistake.text}')
         # Parameters are those of now, whatever changes meanwhile.
         return payload.identify(self._history, StewartPlatform(self._settings))
 

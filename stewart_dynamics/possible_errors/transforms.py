@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Transforms that several hypotheses try: other orders of the legs, other units."""
+"""Transforms that several hypotheses try: orders of legs and axes, signs, units."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from itertools import combinations, permutations
+from itertools import combinations, permutations, product
 
 import numpy as np
 
@@ -30,6 +30,13 @@ def best_order(squares: Array) -> tuple[list[int], float]:
     sums = squares[np.arange(6), _orders()].sum(axis=1)
     best = int(np.argmin(sums))
     return _orders()[best].tolist(), float(sums[best])
+
+
+def axes_and_signs() -> Iterator[tuple[Sequence[int], Sequence[float]]]:
+    """Yield other axes (3,) and signs (3,) of a vector, the fewest changes first."""
+    for axes in sorted(permutations(range(3)), key=lambda each: each != (0, 1, 2)):
+        for signs in sorted(product((1.0, -1.0), repeat=3), key=sum, reverse=True):
+            yield axes, signs
 
 
 def name_of_factor(factor: float, known: Iterable[tuple[float, str]], near: float) -> str:

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Bytes, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.external_wrench.estimate import external_wrenches
 from stewart_dynamics.mechanics.drives.measured_efforts import (
-    EffortSums, has_losses, without_losses)
+    EffortSums, has_losses, SCALE, without_losses)
 from stewart_dynamics.mechanics.drives.motors import motor_ratio, Motors
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.rows import POSE
@@ -189,7 +189,7 @@ class Comparison:
     def values(self) -> dict[str, Any]:
         """Return the part of summary.json."""
         joints, mistake = self._parameters.joints, self._sums.mistake()
-        load_known = mistake is None or mistake.leaves_wrench
+        load_known = mistake is None or mistake.what == SCALE
         wrench = self._wrench if load_known else _Statistics()
         return {
             'setpoints_compared': self._legs.count,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -27,13 +27,6 @@ WITHOUT_VALUE = {IN_COMBINATION: 'only in a combination', FIXED: 'fixed',
                  NOT_IDENTIFIABLE: 'not identifiable'}
 # Numbers below _SMALL with more decimals have an exponent.
 _MOST_DECIMALS, _SMALL = 9, 1e-4
-
-
-class LikelyMistake(NamedTuple):
-    """A possible error in the data, or a likely cause of a lack of fit."""
-
-    what: str  # keyword for programs, as sign, unit, swapped
-    text: str  # description in one line
 
 
 def states_of(what: Identifiability) -> list[str]:

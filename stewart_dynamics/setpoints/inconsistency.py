@@ -19,6 +19,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.frames.motion import listed
 from stewart_dynamics.parameters.table import STANDARD_GRAVITY
+from stewart_dynamics.possible_errors.hypothesis import likeliest
+from stewart_dynamics.possible_errors.transforms import name_of_factor
 
 VELOCITY, SPIN, ACCELERATION, SPIN_RATE = (
     'velocity', 'angular velocity', 'acceleration', 'angular acceleration')
@@ -116,11 +118,7 @@ def reason_of(quantity: str, sums: Sums, frame: tuple[str, str] | None) -> str:
                       f'{abs(late) * 1e3:.3g} ms {"late" if late > 0.0 else "early"}?'))
     if frame is not None:
         found += _of_axes(quantity, sums, *frame)
-    best = min((left for left, _ in found), default=1.0)
-    if best > _EXPLAINED:
-        return ''
-    # The first of those that explain the difference as well as the best one: simpler ones first.
-    return next(words for left, words in found if left <= max(best / _CLEAR, _EXACT))
+    return next((words for _, words in likeliest(found, _EXPLAINED, 1.0 / _CLEAR, _EXACT)), '')
 
 
 def _of_axes(quantity: str, sums: Sums, axes: str, body: str) -> Iterator[tuple[float, str]]:
@@ -148,8 +146,7 @@ def _of_axes(quantity: str, sums: Sums, axes: str, body: str) -> Iterator[tuple[
 
 def factor_words(quantity: str, factor: float, step: float) -> str:
     """Return a constant factor in words, with the mistake that has it."""
-    words = next((words for known, words in _FACTORS[quantity].items()
-                  if abs(factor / known - 1.0) < _NEAR), '')
+    words = name_of_factor(factor, _FACTORS[quantity].items(), 1.0 + _NEAR)
     if abs(factor / step - 1.0) < _NEAR:
         words = 'differences not divided by the time between two samples?'
     rounded = float(f'{factor:.3g}')

@@ -6,15 +6,17 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import NamedTuple
-
 import numpy as np
+
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.parameters.table import AUTO, Parameters
+from stewart_dynamics.possible_errors.hypothesis import (
+    find_errors, First, Hypothesis, likeliest, PossibleError, Table, When)
+from stewart_dynamics.possible_errors.transforms import name_of_factor
 
 # A scale of the efforts within this ratio of a known factor is attributed to that factor.
 _NEAR = 1.35
@@ -83,18 +85,6 @@ def without_losses(forces: Array, rates: Array, accelerations: Array, p: Paramet
     return loads
 
 
-class LegMistake(NamedTuple):
-    """A possible error in measured efforts, velocities or stamps."""
-
-    what: str  # keyword: ZERO, SIGN, ...
-    text: str
-
-    @property
-    def leaves_wrench(self) -> bool:
-        """Return whether there is an external wrench: a load may be several times the file's."""
-        return self.what == SCALE
-
-
 class EffortSums:
     """
     Sums over measured and computed forces of the legs, and the possible error that they show.
@@ -129,7 +119,7 @@ class EffortSums:
         scale = self._scale()
         return scale is not None and 1.0 / FAR < scale < FAR
 
-    def mistake(self) -> LegMistake | None:
+    def mistake(self) -> PossibleError | None:
         """Return the possible error in the efforts; None without one."""
         residual = float(self._residuals.sum())
         # Friction may hold the platform with any force up to its own.
@@ -155,90 +145,94 @@ class EffortSums:
         """Return the squared differences of measured and computed forces (6,) [N^2]."""
         return self.measured_squares - 2.0 * self.own_products + self.computed_squares
 
-    def _of_one_leg(self) -> LegMistake | None:
-        """Return the mistake in one leg's sign, if the other legs are right; a load moves all."""
+    def _of_one_leg(self) -> PossibleError | None:
+        """Return the error in one leg's sign, if the other legs are right; a load moves all."""
         leg, joints = int(np.argmax(self._residuals)), self._parameters.joints
         residual = float(self._residuals[leg])
         if not self.computed_squares[leg] or (
                 float(self._residuals.sum()) - residual > _OTHERS * residual):
             return None
         if not self.measured_squares[leg]:
-            return LegMistake(ZERO, f'the effort of {joints[leg]} is zero')
+            return PossibleError(ZERO, f'the effort of {joints[leg]} is zero')
         product = self.products[leg, leg]
         if _is_near(product / self.computed_squares[leg], -1.0) and (
                 product ** 2 > _ALIKE ** 2 * self.measured_squares[leg]
                 * self.computed_squares[leg]):
-            return LegMistake(SIGN, (
+            return PossibleError(SIGN, (
                 f'the effort of {joints[leg]} has the opposite sign of those of the other legs: '
                 f'{self._parameters.leg_kind.right_sign}'))
         return None
 
-    def _swapped(self) -> LegMistake | None:
+    def _swapped(self) -> PossibleError | None:
         """Return the two legs whose efforts are swapped, if they vary and show it."""
         if not self.count:
             return None
         number, joints = self.count, self._parameters.joints
         varying = self.products - np.outer(self.measured, self.computed) / number
-        best, text = _BETTER, ''
         means = (self.measured - self.computed) ** 2 / number
         residuals = float(self._residuals.sum()), float(np.sum(self._residuals - means))
         moved = float(np.sum(self.computed_squares - self.computed ** 2 / number))
         if residuals[1] < _SUSPICIOUS * moved or moved < _SUSPICIOUS * self.computed_squares.sum():
             return None
-        for a, b in combinations(range(6), 2):
-            left = [1.0 - 2.0 * float(each[a, b] + each[b, a] - each[a, a] - each[b, b]) / residual
-                    for each, residual in zip((self.products, varying), residuals, strict=True)]
-            if max(left) < best:
-                best, text = max(left), (
-                    f'the efforts of {joints[a]} and {joints[b]} look swapped: the residual '
-                    f'becomes {np.sqrt(max(*left, 0.0)):.2f} times as large')
-        return LegMistake(SWAPPED, text) if text else None
+        tried = [(max(1.0 - 2.0 * float(of[a, b] + of[b, a] - of[a, a] - of[b, b]) / residual
+                      for of, residual in zip((self.products, varying), residuals, strict=True)),
+                  (joints[a], joints[b])) for a, b in combinations(range(6), 2)]
+        return next((PossibleError(SWAPPED, (
+            f'the efforts of {one} and {other} look swapped: the residual becomes '
+            f'{np.sqrt(max(misfit, 0.0)):.2f} times as large'))
+            for misfit, (one, other) in likeliest(tried, _BETTER)), None)
 
 
-def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> LegMistake | None:
+class _Scale:
+    """Efforts that are ``scale`` times the model's, of the drives or of the motors."""
+
+    def __init__(self, scale: float, p: Parameters, of_motors: bool) -> None:
+        self.scale, self.kind, self.of_motors = scale, p.leg_kind, of_motors
+        self.side = '' if p.geometry.platform_side != AUTO else (
+            '; or the platform is on the other side of the base: geometry.platform_side')
+        ratio = motor_ratio(p)
+        self.motors = _per_effort(p)
+        self.known, self.per_torque = bool(np.isfinite(ratio).all()), float(np.mean(1.0 / ratio))
+        lead, gear = p.actuator.screw_lead, p.drive.gear_ratio[0]
+        self.ratio = f'drive.gear_ratio, {gear:g}: about {gear / scale:.3g}' if lead is None else (
+            f'actuator.screw_lead, {lead[0]:g} m, is wrong: about {lead[0] * scale:.3g} m would '
+            f'fit; or drive.gear_ratio, {gear:g}: about {gear / scale:.3g}')
+        self.fits = ' would fit' if lead is None else ''
+        self.lead = 2.0 * np.pi * scale
+        self.unit = name_of_factor(scale, self.kind.wrong_units, _NEAR)
+
+
+_Of = Hypothesis[_Scale]
+_TIMES = 'the efforts are {scale:.3g} times what the model computes: '
+_MOTORS = (_TIMES + 'likely torques of the motors in place of {kind.effort.field}: stewart_replay '
+           'and stewart_identify take them with --motor-torque')
+_SCALES: Table[_Scale] = First(
+    _Of(SIGN, lambda s: s.scale < 0.0, (
+        'the efforts have the opposite sign: {kind.right_sign}, as the {kind.effort.field} of the '
+        'node do (they are {scale:.3g} times what the model computes){side}')),
+    When(lambda s: not 1.0 / FAR < s.scale < FAR, First(
+        When(lambda s: s.of_motors, First(
+            _Of(FORCE, lambda s: any(_is_near(s.scale, each, _LOSSES) for each in s.motors), (
+                _TIMES + 'likely {kind.effort.field} at the legs in place of torques or currents '
+                'of the motors: omit --motor-torque, --motor-current')),
+            _Of(SCALE, lambda s: s.known, _TIMES + 'likely {ratio}{fits}'))),
+        _Of(TORQUE, lambda s: s.known and _is_near(s.scale, s.per_torque), _MOTORS),
+        _Of(UNIT, lambda s: len(s.unit), _TIMES + 'likely {unit}'),
+        _Of(TORQUE, lambda s: s.scale < _TORQUES and s.kind.ratio != '', (
+            _MOTORS + ', with actuator.screw_lead (a lead of {lead:.2g} m would fit)')),
+        _Of(SCALE, lambda s: True, _TIMES + 'another unit, or a wrong platform.mass'))))
+
+
+def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> PossibleError | None:
     """
-    Return the possible error if efforts are ``scale`` times the model's.
+    Return the possible error if efforts are ``scale`` times the model's; None without one.
 
     of_motors: whether the efforts were torques or currents of the motors.
     """
-    kind = p.leg_kind
     if not np.isfinite(scale) or scale == 0.0:
-        return LegMistake(
+        return PossibleError(
             ZERO, 'all efforts are zero: brakes hold the legs, or no efforts are measured')
-    if scale < 0.0:
-        other = '' if p.geometry.platform_side != AUTO else (
-            '; or the platform is on the other side of the base: geometry.platform_side')
-        return LegMistake(SIGN, (
-            f'the efforts have the opposite sign: {kind.right_sign}, as the {kind.effort.field} '
-            f'of the node do (they are {scale:.3g} times what the model computes){other}'))
-    if 1.0 / FAR < scale < FAR:
-        return None
-    lead, ratio = p.actuator.screw_lead, p.drive.gear_ratio
-    torques = (f'likely torques of the motors in place of {kind.effort.field}: stewart_replay and '
-               'stewart_identify take them with --motor-torque')
-    units = [unit for factor, unit in kind.wrong_units if _is_near(scale, factor)]
-    known = bool(np.isfinite(motor_ratio(p)).all())
-    if of_motors and any(_is_near(scale, each, _LOSSES) for each in _per_effort(p)):
-        what, likely = FORCE, (f'likely {kind.effort.field} at the legs in place of torques or '
-                               'currents of the motors: omit --motor-torque, --motor-current')
-    elif of_motors and known:
-        of_lead = '' if lead is None else (
-            f'actuator.screw_lead, {lead[0]:g} m, is wrong: about {lead[0] * scale:.3g} m would '
-            'fit; or ')
-        what, likely = SCALE, (
-            f'likely {of_lead}drive.gear_ratio, {ratio[0]:g}: about {ratio[0] / scale:.3g}'
-            + ' would fit' * (lead is None))
-    elif known and _is_near(scale, float(np.mean(1.0 / motor_ratio(p)))):
-        what, likely = TORQUE, torques
-    elif units:
-        what, likely = UNIT, f'likely {units[0]}'
-    elif scale < _TORQUES and kind.ratio:
-        what, likely = TORQUE, (f'{torques}, with actuator.screw_lead (a lead of '
-                                f'{2.0 * np.pi * scale:.2g} m would fit)')
-    else:
-        what, likely = SCALE, 'another unit, or a wrong platform.mass'
-    return LegMistake(
-        what, f'the efforts are {scale:.3g} times what the model computes: {likely}')
+    return next(find_errors(_SCALES, _Scale(scale, p, of_motors)), None)
 
 
 def known_scales(p: Parameters, of_motors: bool) -> list[float]:

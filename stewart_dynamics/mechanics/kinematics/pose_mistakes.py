@@ -5,9 +5,9 @@
 The possible error in a pose that the hexapod cannot have: the one without which it can.
 
 A pose may be counted from home, its position in mm, its quaternion in the order w x y z; the
-joints of one body may be given in the frame of the other. Each is a transform: the pose without the error has
-all legs within their limits, and det(J) has the sign that it has at home. Angles may be in degrees
-if even half of them could not be reached in radians.
+joints of one body may be given in the frame of the other. Each is a transform: the pose without
+the error has all legs within their limits, and det(J) has the sign that it has at home. Angles may
+be in degrees if even half of them could not be reached in radians.
 """
 
 from __future__ import annotations

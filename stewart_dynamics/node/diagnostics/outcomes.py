@@ -19,12 +19,13 @@ from stewart_dynamics.external_wrench.estimate import Estimate, Overload, WRENCH
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.external_wrench.payload import Payload, PayloadOutcome, rows_of
 from stewart_dynamics.legs.kind import Named
-from stewart_dynamics.mechanics.drives.measured_efforts import LegMistake
+from stewart_dynamics.mechanics.drives.measured_efforts import SCALE
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, MISTAKEN, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.trajectory_messages import PlannedOutcome
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 from stewart_dynamics.setpoints.consistency import Mistake
 
 _OVERLOAD = 'overload'  # a cause of a level
@@ -48,7 +49,7 @@ class ExternalWrenchDiagnostics(StatusPart):
         self._estimated_at = NEVER
         self._estimate: Estimate | None = None
         self._target: Sequence[float] | None = None
-        self._mistake: LegMistake | None = None
+        self._mistake: PossibleError | None = None
 
     def heard(self, now: float) -> None:
         """Note that a message has arrived."""
@@ -121,11 +122,11 @@ class ExternalWrenchDiagnostics(StatusPart):
         return values
 
 
-def _mistake(found: LegMistake) -> Mistake:
-    """Return the possible error in the efforts for the status."""
-    wrench = '' if found.leaves_wrench else '; no external wrench is published'
-    return Mistake(MEASURED_LEGS, f'possible error: {found.text}{wrench}', values=(
-        ('possible error in the measurements', found.what),))
+def _mistake(found: PossibleError) -> Mistake:
+    """Return the likely mistake in the efforts for the status."""
+    wrench = '' if found.what == SCALE else '; no external wrench is published'
+    return Mistake(MEASURED_LEGS, f'likely mistake: {found.text}{wrench}', values=(
+        ('likely mistake in the measurements', found.what),))
 
 
 def _apart(motion: Sequence[float], target: Sequence[float]) -> tuple[float, float]:
