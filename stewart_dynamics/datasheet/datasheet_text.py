@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.datasheet.pose_ratings import AXES
+from stewart_dynamics.datasheet.possible_motion import in_words
 from stewart_dynamics.mechanics.limits import (
     LIMITS, POSE, short_name, SINGULARITY, TORQUE_CONTINUOUS)
 from stewart_dynamics.parameters.table import FIXED
@@ -219,13 +220,12 @@ def motion_verdict(found: dict[str, Any]) -> str:
     if found.get('mistakes'):
         return '; '.join(found['mistakes'])
     text = _fastest(found)
-    if found['factor'] == 0.0:
-        return text
     larger = found['amplitude']
-    if larger and larger['value'] is not None:
+    if found['factor'] != 0.0 and larger and larger['value'] is not None:
         text += (f'; up to {down(larger["value"])} times as large about its first pose, limited '
                  f'by {_limit(larger)}')
-    return text
+    changes = in_words(found['possible_with'])
+    return f'{text}; {changes}' if changes else text
 
 
 def _fastest(found: dict[str, Any]) -> str:

@@ -13,6 +13,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.capability.motor_bounds import MotorBounds
 from stewart_dynamics.datasheet.pose_ratings import answer
+from stewart_dynamics.datasheet.possible_motion import possible_changes
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.legs.lines import AnchorCircles
@@ -94,6 +95,12 @@ def _of_circles(circles: AnchorCircles, kind: LegKind, ratios: Array, rows: Arra
     return found
 
 
+def is_possible(used: dict[str, Array]) -> bool:
+    """Return whether a motion with this use of the limits is possible."""
+    return bool(used[SINGULARITY].max() < 1.0 and all(
+        each.max() <= 1.0 + limits.TOLERANCE for each in used.values()))
+
+
 def judged(platform: StewartPlatform, recorded: RecordedMotion,
            used: dict[str, Array]) -> dict[str, Any]:
     """Return whether a motion is possible, how much faster it could be, and its payload."""
@@ -103,7 +110,7 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
     sample = int(used[worst].argmax())
     singular = used[SINGULARITY].max() >= 1.0
     found: dict[str, Any] = {
-        'possible': not singular and used[worst][sample] <= 1.0 + limits.TOLERANCE,
+        'possible': is_possible(used),
         'samples': len(recorded.seconds), 'duration_s': recorded.seconds[-1],
         'largest_use': {name: finite(each.max()) for name, each in used.items()},
         'largest_use_limit': worst, 'largest_use_at_s': recorded.seconds[sample]}
@@ -122,7 +129,11 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
         more = c.payload(
             recorded.motion, np.zeros(3), wrench=recorded.wrench, base=recorded.base)
         payload = answer(more.value, more.limit, more.leg, joints)
-    return found | {'between_setpoints': between, 'amplitude': amplitude, 'payload': payload}
+    changes = [] if found['possible'] or recorded.mistakes else possible_changes(
+        platform, recorded, lambda each: is_possible(uses(platform, each)), found['factor'],
+        None if amplitude is None else amplitude['value'])
+    return found | {'between_setpoints': between, 'amplitude': amplitude, 'payload': payload,
+                    'possible_with': changes}
 
 
 def _between(capability: Capability, recorded: RecordedMotion, joints: Any) -> dict[str, Any]:

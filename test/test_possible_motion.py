@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Changes with which a motion would be possible: they are possible, and little less is not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import ROOT
+from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.datasheet.datasheet_command_line import main
+from stewart_dynamics.datasheet.motion_ratings import judged, uses
+from stewart_dynamics.replay.recorded_motion import read_motion, RecordedMotion
+from stewart_dynamics.replay.replay_options import Options
+
+FILE = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+BAG = ROOT / 'bags' / 'clear'
+# Files in which the motion is not possible, and the changes that make it possible.
+CASES: dict[str, tuple[dict[str, Any], list[str]]] = {
+    'slow legs': ({'limits.velocity_max': 0.05}, ['amplitude', 'speed']),
+    'longer legs': ({'limits.length_min': 1.2, 'limits.length_max': 1.9}, ['amplitude', 'height']),
+    'short legs': ({'limits.length_min': 0.7, 'limits.length_max': 1.3}, ['amplitude']),
+    'weak legs': ({'limits.force_max': 400.0}, ['amplitude']),
+    'hanging': ({'limits.length_min': 1.2, 'limits.length_max': 1.9,
+                 'gravity': [0.0, 0.0, 9.80665], 'geometry.platform_side': 'positive'},
+                ['amplitude', 'height'])}
+
+
+@pytest.fixture(scope='module')
+def recorded() -> RecordedMotion:
+    return read_motion(BAG, FILE, Options())
+
+
+def is_possible(platform: StewartPlatform, recorded: RecordedMotion, change: str, by: float,
+                ) -> bool:
+    """Return whether a changed motion is possible; the change is computed independently."""
+    m = recorded.motion
+    position, rates = m.position.copy(), [m.linear_velocity, m.angular_velocity,
+                                          m.linear_acceleration, m.angular_acceleration]
+    if change == 'height':
+        position[:, 2] += by
+    elif change == 'speed':
+        rates = [by * each for each in rates[:2]] + [by ** 2 * each for each in rates[2:]]
+    else:  # small turns from a first pose without one
+        from scipy.spatial.transform import Rotation
+        turns = Rotation.from_matrix(m.rotation)
+        first = turns[0]
+        small = Rotation.from_rotvec(by * (turns * first.inv()).as_rotvec()) * first
+        changed = Motion(position[0] + by * (position - position[0]), small.as_matrix(),
+                         *(by * each for each in rates))
+        return judged(platform, recorded._replace(motion=changed), uses(
+            platform, recorded._replace(motion=changed)))['possible'] is True
+    changed = Motion(position, m.rotation, *rates)
+    used = uses(platform, recorded._replace(motion=changed))
+    return all(each.max() <= 1.0 + 1e-9 for each in used.values())
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_a_motion_is_possible_with_each_change_and_not_with_less(
+        name: str, recorded: RecordedMotion) -> None:
+    changes, expected = CASES[name]
+    platform = StewartPlatform(FILE.replaced(changes))
+    found = judged(platform, recorded, uses(platform, recorded))
+    assert not found['possible']
+    assert [each['change'] for each in found['possible_with']] == expected
+    for each in found['possible_with']:
+        change, value = each['change'], each['value']
+        assert is_possible(platform, recorded, change, value)
+        less = value - np.sign(value) * 0.01 if change == 'height' else value + 0.03
+        assert not is_possible(platform, recorded, change, less)
+    words = ' '.join(each['words'] for each in found['possible_with'])
+    assert ('higher' in words) == (name == 'longer legs')
+    assert ('lower' in words) == (name == 'hanging')
+
+
+def test_a_possible_motion_has_no_changes(recorded: RecordedMotion) -> None:
+    platform = StewartPlatform(FILE)
+    assert judged(platform, recorded, uses(platform, recorded))['possible_with'] == []
+
+
+def test_terminal_and_page_say_with_which_changes_a_motion_is_possible(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    FILE.replaced(CASES['longer legs'][0]).to_yaml(tmp_path / 'file.yaml')
+    assert main(['--params', str(tmp_path / 'file.yaml'), '--motion', str(BAG), '--output',
+                 str(tmp_path / 'out'), '--strict']) == 1
+    words = 'possible at 9 % of its amplitude, or from 93 mm higher'
+    assert words in ' '.join(capsys.readouterr().out.split())
+    assert words in (tmp_path / 'out' / 'datasheet.html').read_text()
