@@ -16,7 +16,6 @@ from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.setpoints.input_messages import SampleReader
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import Rejection
 from stewart_dynamics.setpoints.step import Batch
@@ -59,19 +58,6 @@ class Feed:
         """Return the rejections; the callback must have got each."""
         assert Counter(rejection for rejection, _ in self.said) == self.setpoints.counts
         return {(topic, reason): n for (topic, reason), n in self.setpoints.counts.items()}
-
-
-def count_read_fields(patch: Any) -> Counter[str]:
-    """Return the messages of each topic that are read field by field from now on."""
-    read: Counter[str] = Counter()
-    read_fields = SampleReader.read_fields
-
-    def count(reader: SampleReader, data: bytes) -> Any:
-        read[reader.topic] += 1
-        return read_fields(reader, data)
-
-    patch.setattr(SampleReader, 'read_fields', count)
-    return read
 
 
 def together(given: Sequence[tuple[str, bytes]], topics: Sequence[str]) -> Messages:

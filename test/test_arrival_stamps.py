@@ -44,9 +44,9 @@ def found(stamps: Stamps, values: Array) -> str:
     """Return the mistake that is found, in many readings and in one after the other."""
     one, many = ArrivalStamps(), ArrivalStamps()
     for stamp, value in zip(stamps.tolist(), values.tolist(), strict=True):
-        one.add(stamp, value)
+        one.add_readings([stamp], [value])
     for part in np.array_split(np.arange(len(stamps)), 7):
-        many.add_many(stamps[part], values[part])
+        many.add_readings(stamps[part], values[part])
     assert one.found == many.found and one.present == many.present
     return one.found[0] if one.found else ''
 
@@ -92,12 +92,12 @@ def test_the_mistake_is_present_until_readings_show_that_it_has_ended() -> None:
     t, values = readings(100.0)
     check = ArrivalStamps()
     bursts, third = in_bursts(t, 4), len(t) // 3
-    check.add_many(bursts[:third], values[:third])
+    check.add_readings(bursts[:third], values[:third])
     assert check.present is not None and check.present == check.found
     assert check.present[1] < int(bursts[third])
-    check.add_many(bursts[third:2 * third], np.ones((third, 6)))  # at rest
+    check.add_readings(bursts[third:2 * third], np.ones((third, 6)))  # at rest
     assert check.present is not None
-    check.add_many(stamps_of(t[2 * third:]), values[2 * third:])
+    check.add_readings(stamps_of(t[2 * third:]), values[2 * third:])
     assert check.present is None and check.found is not None
 
 

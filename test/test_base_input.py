@@ -22,7 +22,7 @@ from sensor_msgs.msg import Imu
 
 from stewart_dynamics import BaseMotion, Motion, Pose
 from stewart_dynamics.messages.cdr import MalformedError
-from stewart_dynamics.messages.setpoint import imu, layout_of
+from stewart_dynamics.messages.setpoint import read_message
 from stewart_dynamics.setpoints.input_messages import (
     BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, LARGEST, POSE, WRENCH)
 from stewart_dynamics.setpoints.rejections import (
@@ -117,15 +117,17 @@ def test_messages_of_rclpy_are_read(little_endian: bool) -> None:
     message.orientation_covariance[0] = -1.0
     message.linear_acceleration_covariance[4] = 7.0
     data = bytes(serialize_message(message))
-    stamp, frame, values = imu(data)
+    stamp, frame, values, _ = read_message(messages.IMU, data)
     assert (stamp, frame, len(values)) == (SECOND, b'imu_link', 37)
     assert (values[13], values[27], values[4], values[32]) == (0.25, 9.5, -1.0, 7.0)
     other = messages.imu(
         SECOND, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), 'a', little_endian=little_endian)
-    assert layout_of(imu, other).read_one(other) == (SECOND, imu(other).values)
+    read = read_message(messages.IMU, other)
+    assert (read.stamp, read.frame) == (SECOND, b'a')
+    assert (read.values[13:16], read.values[25:28]) == ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     for size in range(len(other)):
         with pytest.raises(MalformedError):
-            imu(other[:size])
+            read_message(messages.IMU, other[:size])
 
 
 # Which sample
@@ -354,21 +356,6 @@ def test_many_are_what_they_are_one_by_one(
         source: str, fates: Sequence[str], period: int, cuts: Sequence[int]) -> None:
     messages.check_many(
         Feed(source), Feed(source), recorded(source, fates, period), TOPICS, cuts)
-
-
-def test_of_ordinary_messages_the_first_of_a_topic_is_read_field_by_field(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    for source in SOURCES:
-        given = recorded(source, ['good'] * 50, 2)
-        feed = Feed(source)
-        with monkeypatch.context() as patch:
-            read = messages.count_read_fields(patch)
-            bases = [feed.setpoints.join_messages(messages.together(part, TOPICS)).bases
-                     for part in (given[:103], given[103:])]
-        assert read == dict.fromkeys((POSE, *BASE_SOURCES[source]), 1)
-        assert all(map(np.any, map(np.isfinite, bases)))
-        assert not feed.said
-        messages.check_many(Feed(source), Feed(source), given, TOPICS, [103])
 
 
 # The IMU's angular acceleration: what docs/moving_base.md states

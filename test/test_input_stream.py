@@ -8,7 +8,6 @@ from __future__ import annotations
 import messages
 from messages import MS, SECOND
 import numpy as np
-import pytest
 from referees import rng, symmetric_parameters
 
 from stewart_dynamics.mechanics.frames.base_motion import row_of_motion, row_of_pose
@@ -27,8 +26,7 @@ class Feed(messages.Feed):
             {'setpoint.source': source, 'base.source': base}))
 
 
-def test_layouts_that_take_turns_are_read_alike_and_rarely_learned(
-        monkeypatch: pytest.MonkeyPatch) -> None:
+def test_layouts_that_take_turns_are_read_alike() -> None:
     given = [(POSE, messages.pose(n * MS, (0.001 * n, 0.0, 1.1), frame='base' * (n % 2)))
              for n in range(1, 300)]
     feed = Feed()
@@ -36,11 +34,6 @@ def test_layouts_that_take_turns_are_read_alike_and_rarely_learned(
             if (setpoint := feed(topic, data)) is not None]
     assert rows == [0.001 * n for n in range(1, 300)]
     assert messages.check_many(Feed(), Feed(), given, TOPICS, [7, 90]) == 299
-    # a layout that stays is learned, whatever came before
-    read = messages.count_read_fields(monkeypatch)
-    for n in range(300, 1000):
-        assert feed(POSE, messages.pose(n * MS, frame='')) is not None
-    assert read[POSE] < 300
 
 
 def test_messages_of_any_length_are_read() -> None:
@@ -54,7 +47,7 @@ def test_messages_of_any_length_are_read() -> None:
     assert messages.check_many(Feed('combined'), Feed('combined'), given, TOPICS, [2]) == 5
 
 
-def test_empty_messages_are_malformed_whether_a_layout_is_known_or_not() -> None:
+def test_empty_messages_are_malformed() -> None:
     feed = Feed(base='pose')
     for topic in (POSE, BASE_POSE, WRENCH) * 2:
         assert feed(topic, b'') is None

@@ -22,11 +22,12 @@ from stewart_dynamics.errors import BagError
 from stewart_dynamics.external_wrench.estimate import ExternalWrench
 from stewart_dynamics.external_wrench.measured_legs import MeasuredLegs
 from stewart_dynamics.identification import main as identify
-from stewart_dynamics.messages.joint_state import (
-    FIELDS, JointStateError, JointStateReader, JointStateWriter)
+from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, JointStateWriter
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.replay.read_arrays import read_legs
 from stewart_dynamics.replay.replay_command_line import main as replay
+from test_recorded_efforts import joined
 
 HEXAPOD = StewartPlatform.from_yaml(PLATFORM)
 JOINTS = HEXAPOD.parameters.joints
@@ -51,6 +52,12 @@ def legs(count: int) -> Array:
                      found.forces])
 
 
+def samples_of(reader: JointStateReader, data: bytes) -> list[tuple[int, list[float]]]:
+    """Return stamps and values of the samples that a message completes."""
+    read = reader.read_states(Messages.single('legs', data))
+    return list(zip(read.stamps.tolist(), read.values.tolist(), strict=True))
+
+
 def parts(values: Array, split: Sequence[Sequence[int]], stagger: int = 0,
           fields: int = 3) -> list[tuple[int, int, bytes]]:
     """Return stamp, number of the part, and message, of values (3, N, 6) in parts."""
@@ -67,16 +74,14 @@ def test_parts_of_one_stamp_are_a_whole_message(split: str, fields: list[str]) -
     messages = parts(values, SPLITS[split])
     expected = np.concatenate([values[FIELDS.index(field)] for field in fields], axis=1)
     one, many = JointStateReader(JOINTS, fields), JointStateReader(JOINTS, fields)
-    samples = [sample for *_, data in messages for sample in one.read(data)]
+    samples = [sample for *_, data in messages for sample in samples_of(one, data)]
     stamps, rows = zip(*samples, strict=True)
     assert list(stamps) == [BEGIN + k * PERIOD for k in range(20)]
     np.testing.assert_array_equal(rows, expected)
     for cut in (0, 7, 50):
         found, got = [], []
         for some in (messages[:cut], messages[cut:]):
-            data = b''.join(each for *_, each in some)
-            sizes = [len(each) for *_, each in some]
-            read = many.read_many(data, np.cumsum([0, *sizes[:-1]])[:len(sizes)], sizes)
+            read = many.read_states(joined([each for *_, each in some]))
             found += read.stamps.tolist()
             got += read.values.tolist()
             assert not read.rejected
@@ -93,7 +98,7 @@ def test_legs_with_stamps_of_their_own_are_interpolated() -> None:
     order = sorted((at + 0.02 * (leg == 3), leg, at) for leg in range(6) for at in times[leg])
     for _, leg, at in order:
         stamp = BEGIN + round(at * 1e9)
-        samples += reader.read(JointStateWriter([JOINTS[leg]]).write(
+        samples += samples_of(reader, JointStateWriter([JOINTS[leg]]).write(
             stamp, [leg + (stamp - BEGIN) * 1e-9], [0.0], [0.0]))
     stamps, values = (np.array(each) for each in zip(*samples, strict=True))
     assert len(stamps) > 90 and np.all(np.diff(stamps) == 10_000_000)
@@ -108,21 +113,21 @@ def test_a_leg_that_lacks_or_stops_is_named_and_nothing_is_made_up() -> None:
         k = (stamp - BEGIN) // PERIOD
         if leg == 4 and 50 <= k < 120:
             continue
-        try:
-            found += [(at - BEGIN) // PERIOD for at, _ in reader.read(data)]
-        except JointStateError as exc:
-            said.append((exc.reason, exc.details))
+        read = reader.read_states(Messages.single('legs', data))
+        found += ((read.stamps - BEGIN) // PERIOD).tolist()
+        if read.rejected and not len(read.stamps):
+            said.append(read.last)
     assert found == [*range(50), *range(120, 200)]
     assert set(said) == {('lacks one of the joints', 'leg_5 for 0.1 s')}
     # the first leg is silent: the stamps are those of another one
     reader = JointStateReader(JOINTS)
-    with pytest.raises(JointStateError, match='leg_1 for 0.1 s'):
-        for _, leg, data in parts(values, SPLITS['one each']):
-            assert leg == 0 or not reader.read(data)
+    lasts = [reader.read_states(Messages.single('legs', data)).last
+             for _, leg, data in parts(values, SPLITS['one each']) if leg]
+    assert ('lacks one of the joints', 'leg_1 for 0.1 s') in lasts
     # time jumps back, as in a simulation that begins again
     reader, found = JointStateReader(JOINTS), []
     for _, _, data in 2 * parts(values, SPLITS['halves']):
-        found += [(at - BEGIN) // PERIOD for at, _ in reader.read(data)]
+        found += [(at - BEGIN) // PERIOD for at, _ in samples_of(reader, data)]
     assert found == 2 * [*range(200)]
 
 

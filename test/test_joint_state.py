@@ -15,9 +15,8 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
-from stewart_dynamics.messages.cdr import MALFORMED, MalformedError
-from stewart_dynamics.messages.joint_state import (
-    FIELDS, JointStateError, JointStateReader, JointStateWriter)
+from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, JointStateWriter
+from stewart_dynamics.messages.recorded import Messages
 from test_cdr import same, SECOND, sixes, stamps, texts
 from test_recorded_efforts import joined, joint_state, JOINTS
 
@@ -97,15 +96,12 @@ def one_by_one(reader: JointStateReader, messages: Sequence[bytes],
     """Return stamps and values of messages, and how many were rejected, by reason."""
     found, values, rejected = [], [], Counter[str]()
     for data in messages:
-        try:
-            (stamp, numbers), = reader.read(data)
-        except MalformedError:
-            rejected[MALFORMED] += 1
-        except JointStateError as exc:
-            rejected[exc.reason] += 1
-        else:
-            found.append(stamp)
-            values.append(numbers)
+        read = reader.read_states(Messages.single('legs', data))
+        assert len(read.stamps) + sum(read.rejected.values()) == 1
+        assert {read.last[0]} == set(read.rejected) or read.last == ('', '')
+        found += read.stamps.tolist()
+        values += [*map(tuple, read.values.tolist())]
+        rejected.update(read.rejected)
     return found, values, dict(rejected)
 
 
@@ -128,7 +124,7 @@ def test_many_are_what_they_are_one_by_one(data: st.DataObject, fields: list[str
     one, many = JointStateReader(JOINTS, fields), JointStateReader(JOINTS, fields)
     for cut in (0, len(messages) // 2):
         found, values, rejected = one_by_one(one, messages[cut:])
-        read = many.read_many(*joined(messages[cut:]))
+        read = many.read_states(joined(messages[cut:]))
         assert read.stamps.tolist() == found
         assert list(map(tuple, read.values.tolist())) == values
         assert read.values.shape == (len(found), 6 * len(fields))
@@ -143,23 +139,13 @@ def test_values_are_field_by_field_in_the_order_of_the_joints(fields: list[str])
     data = joint_state(7, names, given['effort'].tolist(), positions=7, velocities=7)
     expected = tuple(number for field in fields for number in given[field][5::-1].tolist())
     for _ in range(2):
-        assert JointStateReader(JOINTS, fields).read(data) == [(7, expected)]
+        read = JointStateReader(JOINTS, fields).read_states(joined([data]))
+        assert (read.stamps.tolist(), read.values.tolist()) == ([7], [[*expected]])
 
 
 def test_only_fields_that_are_wanted_must_be_there() -> None:
     data = joint_state(7, JOINTS, range(6), positions=6)
-    assert JointStateReader(JOINTS, ['position', 'effort']).read(data)[0][0] == 7
-    with pytest.raises(JointStateError) as caught:
-        JointStateReader(JOINTS).read(data)
-    assert (caught.value.reason, caught.value.details) == ('without velocity', '6 names')
-
-
-def test_a_layout_that_is_rejected_is_remembered_like_others(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    reader = JointStateReader(JOINTS)
-    other, good = joint_state(7, ['gripper'], [1.0], '', 1, 1), joint_state(
-        7, JOINTS, range(6), '', 6, 6)
-    one_by_one(reader, [other, good])
-    monkeypatch.delattr(JointStateReader, '_learn')
-    found, _, rejected = one_by_one(reader, [good, other, good, other])
-    assert (found, rejected) == ([7, 7], {'lacks one of the joints': 2})
+    read = JointStateReader(JOINTS, ['position', 'effort']).read_states(joined([data]))
+    assert read.stamps.tolist() == [7]
+    assert JointStateReader(JOINTS).read_states(joined([data])).last == (
+        'without velocity', '6 names')

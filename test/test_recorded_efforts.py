@@ -18,6 +18,7 @@ from referees import rng
 from snapshot import Snapshot
 
 from stewart_dynamics.errors import BagError
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.replay.residuals import Efforts
 
 PROGRAM = 'stewart_replay'
@@ -33,14 +34,17 @@ def joint_state(stamp: int, names: Sequence[str], effort: Sequence[float], frame
         stamp, names, np.arange(positions), np.arange(velocities), effort, frame, little_endian)
 
 
-def joined(messages: Sequence[bytes]) -> tuple[bytes, list[int], list[int]]:
+def joined(messages: Sequence[bytes]) -> Messages:
     """Return messages in one buffer, with bytes between them that are of no message."""
     data, starts = b'', []
     for number, message in enumerate(messages):
         data += bytes(number % 3 + 1)
         starts.append(len(data))
         data += message
-    return data, starts, [len(message) for message in messages]
+    places = np.zeros(len(messages), np.int64)
+    return Messages(('legs',), places, places, np.frombuffer(data, np.uint8),
+                    np.array(starts, np.int64),
+                    np.array([len(message) for message in messages], np.int64))
 
 
 @given(st.data())
@@ -59,7 +63,7 @@ def test_efforts_are_what_rosbags_wrote(data: st.DataObject) -> None:
             effort = data.draw(st.lists(numbers, min_size=len(names), max_size=len(names)))
             messages.append(joint_state(stamp, names, effort, frame, *counts, little))
             expected.append((stamp, [effort[names.index(joint)] for joint in JOINTS]))
-    stamps, efforts, rejected = Efforts(JOINTS).read(*joined(messages))
+    stamps, efforts, rejected = Efforts(JOINTS).read_efforts(joined(messages))
     assert stamps.tolist() == [stamp for stamp, _ in expected]
     assert efforts.tolist() == [effort for _, effort in expected]
     assert rejected == {}
@@ -71,9 +75,7 @@ def test_many_layouts_in_many_calls_keep_their_order() -> None:
     for call in range(3):
         messages = [joint_state(call * 100 + n, [*JOINTS, 'x' * (n % 12)], [float(n)] * 7)
                     for n in range(60)]
-        buffer, starts, sizes = joined(messages)
-        stamps, read, rejected = efforts.read(
-            np.frombuffer(buffer, dtype=np.uint8), np.array(starts), np.array(sizes))
+        stamps, read, rejected = efforts.read_efforts(joined(messages))
         assert stamps.tolist() == [call * 100 + n for n in range(60)]
         assert read[:, 0].tolist() == [float(n) for n in range(60)]
         assert rejected == {}
@@ -98,7 +100,7 @@ def test_messages_without_valid_efforts_are_rejected_and_counted() -> None:
     for each in bad.values():
         messages += [*each, good]
     for turn in (1, -1):
-        stamps, efforts, rejected = Efforts(JOINTS).read(*joined(messages[::turn]))
+        stamps, efforts, rejected = Efforts(JOINTS).read_efforts(joined(messages[::turn]))
         assert stamps.tolist() == [7] * 6
         assert efforts.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]] * 6
         assert rejected == {reason: len(each) for reason, each in bad.items()}
@@ -106,7 +108,7 @@ def test_messages_without_valid_efforts_are_rejected_and_counted() -> None:
 
 def test_numbers_of_joints_that_are_not_asked_for_may_be_anything() -> None:
     message = joint_state(7, ['gripper', *JOINTS], [math.nan, *range(6)])
-    _, efforts, rejected = Efforts(JOINTS).read(*joined([message]))
+    _, efforts, rejected = Efforts(JOINTS).read_efforts(joined([message]))
     assert efforts.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]]
     assert rejected == {}
 
@@ -118,7 +120,7 @@ def test_padding_bytes_are_ignored() -> None:
     # The zero at the end of a text is part of it, which not every version of rosbags looks at.
     ends = {at for at in range(len(good)) if good[:at].endswith((b'base', b'x'))}
     efforts = Efforts(names)
-    efforts.read(*joined([good]))
+    efforts.read_efforts(joined([good]))
     gaps = 0
     for at in sorted({*range(2, len(good))} - ends):
         damaged = good[:at] + bytes([good[at] ^ 0xff]) + good[at + 1:]
@@ -131,7 +133,7 @@ def test_padding_bytes_are_ignored() -> None:
             continue
         if same:
             gaps += 1
-            _, numbers, rejected = efforts.read(*joined([damaged]))
+            _, numbers, rejected = efforts.read_efforts(joined([damaged]))
             assert numbers.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]] and not rejected
     assert gaps > 6
 
@@ -147,7 +149,7 @@ def test_damaged_bytes_never_raise() -> None:
         messages.append(bytes(message[:random.integers(0, len(good) + 1)]
                               if random.random() < 0.3 else message))
     # the good one first: else it could be that none has all the joints
-    stamps, efforts, rejected = Efforts(JOINTS).read(*joined([good, *messages]))
+    stamps, efforts, rejected = Efforts(JOINTS).read_efforts(joined([good, *messages]))
     assert len(stamps) + sum(rejected.values()) == 2001
     assert np.isfinite(efforts).all()
     assert stamps[0] == 7
@@ -156,27 +158,27 @@ def test_damaged_bytes_never_raise() -> None:
 def test_a_joint_in_no_message_is_named(snapshot: Snapshot) -> None:
     names = ['leg_1', 'leg_2', 'leg_3', 'leg_4', 'leg_5', 'cylinder_6']
     efforts = Efforts(JOINTS)
-    stamps, _, rejected = efforts.read(*joined([joint_state(1, names, range(6))]))
+    stamps, _, rejected = efforts.read_efforts(joined([joint_state(1, names, range(6))]))
     assert not len(stamps) and rejected == {'lacks one of the joints': 1}
     with snapshot.raises(BagError):
         efforts.check()
     # also before the end of the bag
     with snapshot.raises(BagError):
-        efforts.read(*joined([joint_state(1, names, range(6))] * 1000))
+        efforts.read_efforts(joined([joint_state(1, names, range(6))] * 1000))
 
 
 def test_joints_of_another_publisher_are_not_an_error() -> None:
     efforts = Efforts(JOINTS)
     other = joint_state(1, ['gripper'], [2.0])
-    efforts.read(*joined([other] * 500))
-    stamps, _, _ = efforts.read(*joined([*[other] * 800, joint_state(1, JOINTS, range(6))]))
+    efforts.read_efforts(joined([other] * 500))
+    stamps, _, _ = efforts.read_efforts(joined([*[other] * 800, joint_state(1, JOINTS, range(6))]))
     assert len(stamps) == 1
-    efforts.read(*joined([other] * 2000))
+    efforts.read_efforts(joined([other] * 2000))
     efforts.check()
 
 
 def test_no_messages_give_nothing() -> None:
     efforts = Efforts(JOINTS)
-    stamps, values, rejected = efforts.read(b'', [], [])
+    stamps, values, rejected = efforts.read_efforts(joined([]))
     assert stamps.shape == (0,) and values.shape == (0, 6) and rejected == {}
     efforts.check()

@@ -566,17 +566,6 @@ def test_many_in_order_are_what_they_are_one_by_one(cuts: Sequence[int]) -> None
     assert check_many([(topic, good(topic, 0)) for _ in range(3) for topic in TOPICS], cuts) == 3
 
 
-def test_of_ordinary_messages_the_first_of_a_topic_is_read_field_by_field(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    read = messages.count_read_fields(monkeypatch)
-    feed = Feed()
-    given = stream(50)
-    for part in (given[:61], given[61:]):
-        feed.setpoints.join_messages(messages.together(part, INPUTS))
-    assert not feed.counts
-    assert read == dict.fromkeys((*TOPICS, WRENCH), 1)
-
-
 def test_many_of_one_topic_may_come_before_the_others() -> None:
     given = [(topic, data) for of in TOPICS for topic, data in stream(3 * WAITING // 2)
              if topic == of]

@@ -20,10 +20,11 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import (
-    aligned8, check_encapsulation, COUNT, MalformedError, nanoseconds, READ_ERRORS, sequence,
-    SEVEN, short_sequence, Stamped, stamped, text, TIME_AND_LENGTH)
+    aligned8, check_encapsulation, COUNT, MalformedError, nanoseconds, ORDERS, READ_ERRORS,
+    sequence, SEVEN, short_sequence, text, TIME_AND_LENGTH)
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.messages.setpoint import combined, layout_of, pose, StampedWriter, twist
+from stewart_dynamics.messages.setpoint import (
+    MESSAGE_TYPES, read_message, StampedNumbers, StampedWriter)
 from stewart_dynamics.program import AXES
 from stewart_dynamics.tables.reading import Reading
 from stewart_dynamics.tables.source_axes import axes_matrix, turned
@@ -35,17 +36,14 @@ ODOMETRY = 'nav_msgs/msg/Odometry'
 # Types that are read as geometry_msgs/PoseStamped where they are named or the only ones.
 POSE_TYPES = (POSE_WITH_COVARIANCE, TRANSFORM, ODOMETRY, POSE, type_names.TF_MESSAGE)
 
-# Readers and kinds of numbers (see ``turned``) of the types that other axes change.
-_TURNED: Mapping[str, tuple[Callable[[bytes], Stamped], tuple[str, ...]]] = {
-    type_names.POSE_STAMPED: (pose, ('vq',)),
-    type_names.TWIST_STAMPED: (twist, ('va',)),
-    type_names.ACCEL_STAMPED: (twist, ('va',)),
-    type_names.WRENCH_STAMPED: (twist, ('va',)),
-    type_names.MULTI_DOF_JOINT_TRAJECTORY: (combined, ('vq', 'va', 'va'))}
+# Kinds of numbers (see ``turned``) of the types that other axes change.
+_TURNED = {
+    type_names.POSE_STAMPED: ('vq',), type_names.TWIST_STAMPED: ('va',),
+    type_names.ACCEL_STAMPED: ('va',), type_names.WRENCH_STAMPED: ('va',),
+    type_names.MULTI_DOF_JOINT_TRAJECTORY: ('vq', 'va', 'va')}
 
 # Types that are a header and numbers.
-_HEADED = (type_names.POSE_STAMPED, type_names.TWIST_STAMPED, type_names.ACCEL_STAMPED,
-           type_names.WRENCH_STAMPED, type_names.IMU)
+_HEADED = {*MESSAGE_TYPES} - {type_names.MULTI_DOF_JOINT_TRAJECTORY}
 # The first byte of a frame_id behind encapsulation, stamp and length.
 _FRAME = 16
 
@@ -104,7 +102,7 @@ class Converter:
 
         return convert
 
-    def _poses(self, kind: str, data: bytes, time: int) -> Iterator[Stamped]:
+    def _poses(self, kind: str, data: bytes, time: int) -> Iterator[StampedNumbers]:
         if kind == type_names.TF_MESSAGE:
             for child, one in _transforms(data):
                 self.children.add(child)
@@ -113,13 +111,13 @@ class Converter:
                     yield one
         elif kind == POSE:
             check_encapsulation(data)
-            yield Stamped(time, b'', SEVEN[data[1]].unpack_from(data, 4))
+            yield StampedNumbers(time, b'', SEVEN[data[1]].unpack_from(data, 4), ())
         elif kind == POSE_WITH_COVARIANCE:
-            yield stamped(data, SEVEN)
+            yield read_message(type_names.POSE_STAMPED, data)
         else:
             yield _with_child(data, 4)[1]
 
-    def _written(self, one: Stamped) -> bytes:
+    def _written(self, one: StampedNumbers) -> bytes:
         values: Array = turned(np.array(one.values), self._matrix, 'vq')
         frame = one.frame.removeprefix(b'/').decode(errors='replace')
         return _writer(frame).write(one.stamp, values.tolist())
@@ -140,43 +138,38 @@ def _without_slash(data: bytes) -> bytes:
 
 
 def _turning(kind: str, matrix: Array) -> Callable[[bytes, int], list[bytes]]:
-    reader, kinds = _TURNED[kind]
-
     def convert(data: bytes, time: int) -> list[bytes]:
-        values = np.array(reader(data).values)
-        layout = layout_of(reader, data)
-        stamp = nanoseconds(data, *TIME_AND_LENGTH[data[1]].unpack_from(data, 4)[:2])
-        parts, at = [], 0
-        for each in kinds:
-            count = 7 if each == 'vq' else 6
-            parts.append(turned(values[at:at + count], matrix, each).tolist())
-            at += count
-        return [layout.write_one(stamp, *parts)]
+        message, made, first = read_message(kind, data), bytearray(data), 0
+        for numbers, (at, count) in zip(_TURNED[kind], message.parts, strict=True):
+            part = turned(np.array(message.values[first:first + count]), matrix, numbers)
+            made[at:at + 8 * count] = part.astype(f'{ORDERS[data[1]]}f8').tobytes()
+            first += count
+        return [bytes(made)]
 
     return convert
 
 
-def _transforms(data: bytes) -> Iterator[tuple[str, Stamped]]:
+def _transforms(data: bytes) -> Iterator[tuple[str, StampedNumbers]]:
     """Yield child frames and transforms of a tf2_msgs/TFMessage."""
     check_encapsulation(data)
-    count, at = short_sequence(data, 4, COUNT[data[1]], [])
+    count, at = short_sequence(data, 4, COUNT[data[1]])
     for _ in range(count):
         at = at + 3 & ~3
         child, one, at = *_with_child(data, at), _end_of_transform(data, at)
         yield child, one
 
 
-def _with_child(data: bytes, at: int) -> tuple[str, Stamped]:
+def _with_child(data: bytes, at: int) -> tuple[str, StampedNumbers]:
     """Return child frame and pose at a header, which child_frame_id and seven numbers follow."""
     sec, nanosec, size = TIME_AND_LENGTH[data[1]].unpack_from(data, at)
     frame = text(data, at + 12, size)
-    length, begin = sequence(data, at + 12 + size, COUNT[data[1]], [])
+    length, begin = sequence(data, at + 12 + size, COUNT[data[1]])
     child = text(data, begin, length).decode(errors='replace').lstrip('/')
     values = SEVEN[data[1]].unpack_from(data, aligned8(begin + length))
-    return child, Stamped(nanoseconds(data, sec, nanosec), frame, values)
+    return child, StampedNumbers(nanoseconds(data, sec, nanosec), frame, values, ())
 
 
 def _end_of_transform(data: bytes, at: int) -> int:
     size = TIME_AND_LENGTH[data[1]].unpack_from(data, at)[2]
-    length, begin = sequence(data, at + 12 + size, COUNT[data[1]], [])
+    length, begin = sequence(data, at + 12 + size, COUNT[data[1]])
     return aligned8(begin + length) + SEVEN[1].size

@@ -19,10 +19,11 @@ from stewart_dynamics.calibration.measured_poses import (
 from stewart_dynamics.calibration.rests import find_rests, mean_pose, SETTLING, SHORTEST
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.messages import setpoint, type_names
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateReader
 from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.messages.setpoint import read_message
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.tolerances import is_unit
 from stewart_dynamics.replay.bag_topics import find_calibrated_legs
@@ -58,14 +59,14 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
         poses: list[tuple[int, tuple[float, ...]]] = []
 
         def add_legs(messages: Messages) -> None:
-            states = reader.read_many(messages.data, messages.starts, messages.sizes)
+            states = reader.read_states(messages)
             leg_stamps.append(states.stamps)
             leg_values.append(states.values)
 
         def add_poses(messages: Messages) -> None:
             for _, _, data in messages.each():
                 try:
-                    stamp, _, values = setpoint.pose(data)
+                    stamp, _, values, _ = read_message(type_names.POSE_STAMPED, data)
                 except MalformedError:
                     continue
                 if np.isfinite(values).all() and is_unit(np.linalg.norm(values[3:])):

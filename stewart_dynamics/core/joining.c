@@ -12,31 +12,22 @@
  */
 
 enum {
-  OF_A_GROUP = 3, BASE_GROUP = 1, GROUPS = 2, WRENCH_TOPIC = 6, MOST_NUMBERS = 24,
+  OF_A_GROUP = 3, BASE_GROUP = 1, GROUPS = 2, WRENCH_TOPIC = 6, MOST_JOINED = 24,
   OF_BASE = 1000  /* samples that are kept, for setpoints that had to wait */
 };
 
 /* What has come of a topic without a stamp since the last setpoint. */
 enum { NOTHING, UNUSABLE, USABLE };
 
-typedef struct {
-  int64_t size, n_parts, quaternion, n_measured;
-  const uint8_t * message, * fixed;
-  const message_part * parts;
-  const int64_t * measured;
-  double largest;
-} message_layout;
-
 /* A topic: its samples that wait, in order of arrival, each at a place of the values. */
 typedef struct {
-  message_layout layout;
   int64_t width;  /* numbers of a sample */
   int64_t waiting, last;
   int64_t stamps[MOST_WAITING + 1], places[MOST_WAITING + 1];  /* places behind: free ones */
   int64_t without_stamp, unstamped;  /* the last message had no stamp; see above */
-  double unstamped_values[MOST_NUMBERS];
-  double values[MOST_WAITING + 1][MOST_NUMBERS];
-} topic_input;
+  double unstamped_values[MOST_JOINED];
+  double values[MOST_WAITING + 1][MOST_JOINED];
+} waiting_samples;
 
 /* Topics that are joined. */
 typedef struct {
@@ -44,12 +35,27 @@ typedef struct {
   int64_t noticed;                     /* that stamps are zero */
   int64_t first, arrived[OF_A_GROUP];  /* topics without stamps: first of a setpoint, or -1; order */
   int64_t n_arrived;
-  topic_input inputs[OF_A_GROUP];
+  waiting_samples inputs[OF_A_GROUP];
 } topic_group;
+
+/* Messages, and what they complete: see put_memory. */
+typedef struct {
+  const int64_t * topics, * times, * starts, * sizes;
+  const uint8_t * data;
+  int64_t * stamps, * places, * base_stamps;
+  setpoint * setpoints;
+  stewart_base * bases;
+  double * base_values, * base_restarts;
+  stewart_output * outputs;
+  uint8_t * messages, * having;
+  int64_t event_room;
+  input_event * events;
+  join_progress * progress;
+} stream_memory;
 
 typedef struct {
   topic_group groups[GROUPS];
-  message_layout wrench_layout;
+  input_topic * topics;  /* those of the groups, and that of the load */
   double wrench[6];
   int64_t restarting, restart_timeout;
   int64_t source;
@@ -58,6 +64,10 @@ typedef struct {
   imu_filter filter;
   int64_t newest, count, stamps[OF_BASE];  /* samples of the base: a ring */
   stewart_base bases[OF_BASE];
+  const stewart_platform * platform;  /* that answers setpoints, from this state */
+  stewart_state state;
+  message_rows answers;
+  stream_memory at;
 } input_stream;
 
 /* What a call writes. */
@@ -75,7 +85,7 @@ static void note_event(event_list * list, int64_t kind, int64_t topic, int64_t s
 int64_t input_stream_size(void) {return (int64_t)sizeof(input_stream);}
 
 void begin_stream(
-  uint8_t * memory, const int64_t * widths, int64_t tolerance, int64_t timeout,
+  uint8_t * memory, input_topic * topics, const int64_t * widths, int64_t tolerance, int64_t timeout,
   int64_t base_timeout, int64_t source, const double * gravity, const imu_mounting * imu) {
   input_stream * stream = (input_stream *)memory;
   int64_t timeouts[GROUPS] = {timeout, base_timeout};
@@ -88,23 +98,20 @@ void begin_stream(
       for (int64_t k = 0; k <= MOST_WAITING; k++) {group->inputs[n].places[k] = k;}
     }
   }
-  stream->restart_timeout = timeout, stream->source = source;
+  stream->topics = topics, stream->restart_timeout = timeout, stream->source = source;
   memcpy(stream->gravity, gravity, sizeof stream->gravity);
   stream->imu = *imu;
 }
 
-static topic_input * input_of(input_stream * stream, int64_t topic) {
-  return &stream->groups[topic / OF_A_GROUP].inputs[topic % OF_A_GROUP];
-}
-
-void put_layout(
-  uint8_t * memory, int64_t topic, int64_t size, const uint8_t * message, const uint8_t * fixed,
-  int64_t n_parts, const message_part * parts, int64_t quaternion, int64_t n_measured,
-  const int64_t * measured, double largest) {
+void put_answers(
+  uint8_t * memory, const stewart_platform * platform, const stewart_platform * servos,
+  int64_t size, const uint8_t * message, int64_t n_stamps, const int64_t * stamp_places,
+  int64_t n_parts, const message_part * parts, int64_t n_kinds,
+  const message_condition * conditions) {
   input_stream * stream = (input_stream *)memory;
-  message_layout layout = {
-    size, n_parts, quaternion, n_measured, message, fixed, parts, measured, largest};
-  *(topic == WRENCH_TOPIC ? &stream->wrench_layout : &input_of(stream, topic)->layout) = layout;
+  message_rows rows = {
+    servos, size, message, n_stamps, stamp_places, n_parts, parts, n_kinds, conditions};
+  stream->platform = platform, stream->answers = rows;
 }
 
 int64_t stamp_order(int64_t stamp, int64_t known, int64_t last, int64_t timeout) {
@@ -117,7 +124,7 @@ static uint64_t distance(int64_t a, int64_t b) {
 }
 
 /* Return the place of a stamp in the order of waiting samples, -1: it does not wait. */
-static int64_t find_stamp(const topic_input * input, int64_t stamp) {
+static int64_t find_stamp(const waiting_samples * input, int64_t stamp) {
   if (input->waiting && input->stamps[0] == stamp) {return 0;}
   int64_t n = input->waiting - 1;
   while (n >= 0 && input->stamps[n] != stamp) {n--;}
@@ -125,7 +132,7 @@ static int64_t find_stamp(const topic_input * input, int64_t stamp) {
 }
 
 /* Return the first of the nearest stamps. */
-static int64_t find_nearest(const topic_input * input, int64_t stamp) {
+static int64_t find_nearest(const waiting_samples * input, int64_t stamp) {
   int64_t nearest = 0;
   for (int64_t n = 1; n < input->waiting; n++) {
     if (distance(input->stamps[n], stamp) < distance(input->stamps[nearest], stamp)) {nearest = n;}
@@ -133,7 +140,7 @@ static int64_t find_nearest(const topic_input * input, int64_t stamp) {
   return nearest;
 }
 
-static void remove_sample(topic_input * input, int64_t n) {
+static void remove_sample(waiting_samples * input, int64_t n) {
   int64_t place = input->places[n], behind = --input->waiting - n;
   memmove(&input->stamps[n], &input->stamps[n + 1], (size_t)behind * sizeof *input->stamps);
   memmove(&input->places[n], &input->places[n + 1], (size_t)behind * sizeof *input->places);
@@ -154,7 +161,7 @@ static void drop_unstamped(topic_group * group, int64_t first_topic, event_list 
 /* Drop all that waits. */
 static void drop_waiting(topic_group * group, int64_t first_topic, int64_t kind, event_list * list) {
   for (int64_t topic = 0; topic < group->topics; topic++) {
-    topic_input * input = &group->inputs[topic];
+    waiting_samples * input = &group->inputs[topic];
     for (int64_t n = 0; n < input->waiting; n++) {
       note_event(list, kind, first_topic + topic, input->stamps[n], 0);
     }
@@ -163,10 +170,9 @@ static void drop_waiting(topic_group * group, int64_t first_topic, int64_t kind,
   drop_unstamped(group, first_topic, list);
 }
 
-void end_stream(
-  uint8_t * memory, int64_t group, int64_t restart, input_event * events, int64_t * n_events) {
+void end_stream(uint8_t * memory, int64_t group, int64_t restart) {
   input_stream * stream = (input_stream *)memory;
-  event_list list = {events, n_events, -1};
+  event_list list = {stream->at.events, &stream->at.progress->events, -1};
   drop_waiting(&stream->groups[group], OF_A_GROUP * group, EVENT_ENDED, &list);
   if (restart) {
     stream->groups[group].used = 0;
@@ -182,7 +188,7 @@ static int drop_passed(
     stamp_order(stamps[0], group->used, before, group->timeout) == STAMP_RESTART;
   if (restart) {note_event(list, EVENT_RESTART, first_topic, stamps[0], before);}
   for (int64_t topic = 0; topic < group->topics; topic++) {
-    topic_input * input = &group->inputs[topic];
+    waiting_samples * input = &group->inputs[topic];
     /* after a restart, samples from before it lie in the future */
     int64_t future = restart ? input->last - group->timeout : INT64_MAX;
     for (int64_t n = 0; n < input->waiting;) {
@@ -203,7 +209,7 @@ static int drop_passed(
 /* A joined sample. */
 typedef struct {
   int64_t stamp;
-  double values[MOST_NUMBERS], restart, stamped;
+  double values[MOST_JOINED], restart, stamped;
 } joined_sample;
 
 /* Join a sample without a stamp, unusable if its message is rejected, in order of arrival. A joined
@@ -213,7 +219,7 @@ typedef struct {
 static int join_unstamped(
   topic_group * group, int64_t first_topic, int64_t topic, const double * values, int64_t clock,
   joined_sample * joined, event_list * list) {
-  topic_input * input = &group->inputs[topic];
+  waiting_samples * input = &group->inputs[topic];
   if (!group->noticed) {
     group->noticed = 1;
     note_event(list, EVENT_NOTICE_UNSTAMPED, first_topic + topic, 0, 0);
@@ -253,7 +259,7 @@ static int join_unstamped(
 static int find_samples(const topic_group * group, int64_t stamp, int64_t * stamps) {
   int64_t at = stamp, low = INT64_MAX, high = INT64_MIN;
   for (int64_t topic = 0; topic < group->topics; topic++) {
-    const topic_input * input = &group->inputs[topic];
+    const waiting_samples * input = &group->inputs[topic];
     if (find_stamp(input, at) < 0) {
       if (!group->tolerance || !input->waiting) {return 0;}
       at = input->stamps[find_nearest(input, at)];
@@ -269,7 +275,7 @@ static int find_samples(const topic_group * group, int64_t stamp, int64_t * stam
 static int join_sample(
   topic_group * group, int64_t first_topic, int64_t topic, int64_t stamp, const double * values,
   int64_t clock, joined_sample * joined, event_list * list) {
-  topic_input * input = &group->inputs[topic];
+  waiting_samples * input = &group->inputs[topic];
   if (!values) {  /* a rejected one without a stamp keeps its place in the order */
     if (input->without_stamp) {
       join_unstamped(group, first_topic, topic, NULL, clock, joined, list);
@@ -410,68 +416,77 @@ static void put_setpoint(
   to->restart = restart, to->stamped = sample->stamped;
 }
 
-static int read_sample(
-  const message_layout * layout, int64_t size, const uint8_t * from, int64_t * stamp,
-  double * values) {
-  return layout->message && size == layout->size && is_alike(from, layout->message, layout->fixed, size) &&
-    take_sample(from, layout->n_parts, layout->parts, layout->quaternion, layout->n_measured,
-                layout->measured, layout->largest, stamp, values);
+void put_memory(
+  uint8_t * memory, const int64_t * topics, const int64_t * times, const int64_t * starts,
+  const int64_t * sizes, const uint8_t * data, int64_t * stamps, setpoint * setpoints,
+  int64_t * places, int64_t * base_stamps, stewart_base * bases, double * base_values,
+  double * base_restarts, stewart_output * outputs, uint8_t * messages, uint8_t * having,
+  int64_t event_room, input_event * events, join_progress * progress) {
+  stream_memory at = {
+    topics, times, starts, sizes, data, stamps, places, base_stamps, setpoints, bases, base_values,
+    base_restarts, outputs, messages, having, event_room, events, progress};
+  ((input_stream *)memory)->at = at;
 }
 
-void join_messages(
-  uint8_t * memory, int64_t count, const int64_t * topics, const int64_t * times,
-  const uint8_t * data, const int64_t * starts, const int64_t * sizes, given_sample * given,
-  int64_t * stamps, setpoint * setpoints, int64_t * places, int64_t * base_stamps,
-  stewart_base * bases, double * base_values, double * base_restarts, int64_t event_room,
-  input_event * events, join_progress * progress) {
+static void answer_from(input_stream * stream, int64_t n, int64_t end) {
+  const stream_memory * at = &stream->at;
+  const message_rows * rows = &stream->answers;
+  step_setpoints(stream->platform, 0, end - n, at->stamps + n, at->setpoints + n, &stream->state,
+                 at->outputs + n);
+  write_rows(rows, NUMBERS(stewart_output), end - n, at->stamps + n,
+             (const double *)(at->outputs + n), at->messages + n * rows->size,
+             at->having + n * rows->n_kinds);
+}
+
+void answer_setpoints(uint8_t * memory) {
   input_stream * stream = (input_stream *)memory;
-  event_list list = {events, &progress->events, 0};
-  double values[MOST_NUMBERS];
+  answer_from(stream, 0, stream->at.progress->setpoints);
+}
+
+void join_messages(uint8_t * memory) {
+  input_stream * stream = (input_stream *)memory;
+  const stream_memory * at = &stream->at;
+  join_progress * progress = at->progress;
+  event_list list = {at->events, &progress->events, 0};
+  double values[MOST_JOINED];
   progress->status = JOIN_DONE;
-  for (int64_t k = progress->next; k < count; k++) {
+  for (int64_t k = progress->next; k < progress->count; k++) {
     progress->next = k;
-    int64_t topic = topics[k], stamp = 0;
+    int64_t topic = at->topics[k], stamp;
     if (topic < 0) {continue;}
-    if (progress->events + 2 * OF_A_GROUP * (MOST_WAITING + 2) > event_room) {
+    if (progress->events + 2 * OF_A_GROUP * (MOST_WAITING + 2) > at->event_room) {
       progress->status = JOIN_EVENTS;
       return;
     }
     list.message = k;
-    const double * read = values;
-    if (given->state != SAMPLE_UNREAD) {
-      read = given->state == SAMPLE_VALID ? given->values : NULL, stamp = given->stamp;
-    } else if (!read_sample(
-        topic == WRENCH_TOPIC ? &stream->wrench_layout : &input_of(stream, topic)->layout, sizes[k],
-        data + starts[k], &stamp, values)) {
-      progress->status = JOIN_UNREAD;
-      return;
-    }
+    int64_t event = read_sample(
+      &stream->topics[topic], at->sizes[k], at->data + at->starts[k], &stamp, values);
+    int valid = event == EVENT_NONE;
+    if (!valid) {note_event(&list, event, topic, 0, 0);}
     if (topic == WRENCH_TOPIC) {
-      if (read) {memcpy(stream->wrench, read, sizeof stream->wrench);}
-      given->state = SAMPLE_UNREAD;
+      if (valid) {memcpy(stream->wrench, values, sizeof stream->wrench);}
       continue;
     }
-    if (read && stamp == 0 && !progress->timed) {
-      progress->status = JOIN_CLOCK;  /* a valid sample that is given stays */
+    if (valid && stamp == 0 && !progress->timed) {
+      progress->status = JOIN_CLOCK;
       return;
     }
     int64_t first = topic / OF_A_GROUP * OF_A_GROUP;
     joined_sample joined;
     memset(joined.values, 0, sizeof joined.values);  /* without twist and acceleration: at rest */
-    int complete = join_sample(&stream->groups[topic / OF_A_GROUP], first, topic - first, stamp, read,
-                               times[k], &joined, &list);
-    given->state = SAMPLE_UNREAD;
+    int complete = join_sample(&stream->groups[topic / OF_A_GROUP], first, topic - first, stamp,
+                               valid ? values : NULL, at->times[k], &joined, &list);
     if (complete && first) {
-      int64_t n = progress->bases++;
-      int64_t width = stream->groups[BASE_GROUP].width;
-      base_stamps[n] = joined.stamp, base_restarts[n] = joined.restart;
-      memcpy(base_values + n * width, joined.values, (size_t)width * sizeof *base_values);
-      add_base(stream, &joined, &bases[n]);
+      int64_t n = progress->bases++, width = stream->groups[BASE_GROUP].width;
+      at->base_stamps[n] = joined.stamp, at->base_restarts[n] = joined.restart;
+      memcpy(at->base_values + n * width, joined.values, (size_t)width * sizeof(double));
+      add_base(stream, &joined, &at->bases[n]);
     } else if (complete) {
       int64_t n = progress->setpoints++;
-      stamps[n] = joined.stamp, places[n] = k;
-      put_setpoint(stream, &joined, &setpoints[n], &list);
+      at->stamps[n] = joined.stamp, at->places[n] = k;
+      put_setpoint(stream, &joined, &at->setpoints[n], &list);
+      if (stream->platform && !progress->held) {answer_from(stream, n, n + 1);}
     }
   }
-  progress->next = count;
+  progress->next = progress->count;
 }

@@ -152,16 +152,65 @@ typedef struct { int64_t at, column, count; } message_part;
 /* A message is for rows where a column is not nan, another is nan, another is above zero; -1: any. */
 typedef struct { int64_t known, unknown, positive; } message_condition;
 
-/* Samples of messages of one layout, each at its place in the data: stamps (count,) [ns] and numbers
-   (count, width), a quaternion as a rotation from column 3 on. Bytes that are `fixed` (255, others
-   0) are as in one message, numbers finite and not above `largest`, quaternions of length 1, and
-   numbers at some places not -1: covariances of what is measured. Returns how many are read, up to
-   the first that is not so. quaternion: its place, or -1. */
-int64_t read_messages(
-  int64_t size, const uint8_t * message, const uint8_t * fixed, int64_t n_parts,
-  const message_part * parts, int64_t quaternion, int64_t n_measured, const int64_t * measured,
-  double largest, int64_t width, int64_t count, const uint8_t * data, const int64_t * starts,
-  const int64_t * sizes, int64_t * stamps, double * values);
+/* Types of messages that are a header and numbers: PoseStamped; TwistStamped, AccelStamped and
+   WrenchStamped; Imu; MultiDOFJointTrajectory of one point and one joint. */
+enum { MESSAGE_POSE = 0, MESSAGE_TWIST = 1, MESSAGE_IMU = 2, MESSAGE_COMBINED = 3 };
+
+/* Why bytes are no message of a type; most come with the number that breaks a rule. */
+enum {
+  FAULT_NONE = 0, FAULT_ENCAPSULATION = 1, FAULT_ENDS = 2, FAULT_NANOSECONDS = 3, FAULT_TEXT = 4,
+  FAULT_SEQUENCE = 5, FAULT_ENTRIES = 6, FAULT_NAMES = 7, FAULT_POINTS = 8, FAULT_TRANSFORMS = 9,
+  FAULT_VELOCITIES = 10, FAULT_ACCELERATIONS = 11, FAULT_SHORTER = 12
+};
+
+/* What a message has beside its numbers: stamp [ns], length of frame_id, which begins at byte 16, and
+   where the numbers are. */
+typedef struct { int64_t stamp, fault, number, frame_size, places[3]; } message_content;
+
+void read_message(
+  int64_t type, int64_t size, const uint8_t * data, message_content * content, double * numbers);
+
+/* Why a message or sample is not used, or what the log is told. */
+enum {
+  EVENT_NONE = 0, EVENT_TWICE = 1, EVENT_TOO_OLD = 2, EVENT_NOT_JOINED = 3,
+  EVENT_UNSTAMPED_DROPPED = 4, EVENT_ENDED = 5, EVENT_BEFORE_RESTART = 6, EVENT_RESTART = 7,
+  EVENT_NOTICE_UNSTAMPED = 8, EVENT_MALFORMED = 9, EVENT_WRONG_FRAME = 10, EVENT_NOT_MEASURED = 11,
+  EVENT_NOT_FINITE = 12, EVENT_OUT_OF_RANGE = 13, EVENT_NOT_UNIT = 14
+};
+
+/* A topic: type of its messages, bound of their numbers, and the frame_id that they must have, if it
+   is not empty; frame_size -1: that of the first valid message that has one. Of longer ones the
+   first FRAME_ROOM characters and the length are compared. */
+enum { FRAME_ROOM = 256 };
+typedef struct { double largest; int64_t type, frame_size; uint8_t frame[256]; } input_topic;
+
+/* Samples of messages (count,) of a topic, each at its place in the data: stamps (count,) [ns] and
+   values (count, width), quaternions as rotations, of an IMU angular velocity and specific force.
+   Events (count,): EVENT_NONE where the message is valid. */
+void read_samples(
+  input_topic * topic, int64_t width, int64_t count, const uint8_t * data, const int64_t * starts,
+  const int64_t * sizes, int64_t * stamps, double * values, int64_t * events);
+
+/* A JointState: whether it can be used, its stamp [ns], how many of the joints and which it has (bits),
+   numbers of its names, positions, velocities and efforts, which of the wanted fields are empty
+   or not as long as the names (bits), where the names begin. */
+enum {
+  JOINTS_VALID = 0, JOINTS_NOT_FINITE = 1, JOINTS_MALFORMED = 2, JOINTS_MISSING = 3,
+  JOINTS_LACKING = 4, JOINTS_UNEVEN = 5
+};
+typedef struct {
+  int64_t state, stamp, fault, number, n_joints, there, counts[4], lacking, uneven, names_at;
+} joint_state;
+
+/* States of messages (count,) of the joints whose names, one after the other, have these ends, and
+   their values (count, width): of all joints in one wanted field, then in the next; nan where a
+   message lacks a joint. wanted (3,): position, velocity, effort. More than half of the joints must
+   be there, or at most half of them, a part. */
+enum { MOST_JOINTS = 32, MOST_ENTRIES = 1000 };
+void read_joint_states(
+  int64_t n_joints, const uint8_t * names, const int64_t * ends, const uint8_t * wanted,
+  int64_t width, int64_t count, const uint8_t * data, const int64_t * starts,
+  const int64_t * sizes, joint_state * states, double * values);
 
 /* How a stamp follows the last used one, if one is known: a stamp that is earlier by more than the
    timeout is a restart [ns]. */
@@ -171,53 +220,56 @@ int64_t stamp_order(int64_t stamp, int64_t known, int64_t last, int64_t timeout)
 /* What the motion of the base is computed from: a pose at rest, a pose that moves, an IMU. */
 enum { BASE_AT_REST = 1, BASE_MOVING = 2, BASE_BY_IMU = 3 };
 
-/* Why a sample is not used, or what the log is told: its topic, stamps, and which message. */
-enum {
-  EVENT_TWICE = 1, EVENT_TOO_OLD = 2, EVENT_NOT_JOINED = 3, EVENT_UNSTAMPED_DROPPED = 4,
-  EVENT_ENDED = 5, EVENT_BEFORE_RESTART = 6, EVENT_RESTART = 7, EVENT_NOTICE_UNSTAMPED = 8
-};
+/* An event: of a topic, with stamps [ns], and the index of its message. */
 typedef struct { int64_t kind, topic, stamp, last, message; } input_event;
 
-/* A sample that is read elsewhere, in place of the next message. */
-enum { SAMPLE_UNREAD = 0, SAMPLE_VALID = 1, SAMPLE_REJECTED = 2 };
-typedef struct { int64_t state, stamp; double values[24]; } given_sample;
-
-/* Why a call returns: all messages are used; the next one has no known layout or is not valid; it
-   has no stamp and needs the clock; events have no room. */
-enum { JOIN_DONE = 0, JOIN_UNREAD = 1, JOIN_CLOCK = 2, JOIN_EVENTS = 3 };
-/* Index of the next message; numbers of setpoints, of samples of the base and of events so far; why
-   the call returns; whether the times are those of a clock. */
-typedef struct { int64_t next, setpoints, bases, events, status, timed; } join_progress;
+/* Why a call returns: all messages are used; the next one has no stamp and needs the clock; events
+   have no room. */
+enum { JOIN_DONE = 0, JOIN_CLOCK = 1, JOIN_EVENTS = 2 };
+/* Number of messages, index of the next one; numbers of setpoints, of samples of the base and of events so far; why
+   the call returns; whether the times are those of a clock; whether setpoints are not answered. */
+typedef struct {
+  int64_t count, next, setpoints, bases, events, status, timed, held;
+} join_progress;
 
 /* The stream of messages on the topics of setpoints (0, 1, 2), of the base (3, 4, 5) and of the load
-   (6), joined by stamp: see joining.c; of a topic MOST_WAITING samples may wait. widths (6,): numbers of a sample, 0: no such topic; tolerance
-   and timeouts [ns]; source and gravity of the base, world axes. */
+   (6), joined by stamp: see joining.c; of a topic MOST_WAITING samples may wait. topics (7,): they
+   stay where they are. widths (6,): numbers of a sample, 0: no such topic; tolerance and timeouts
+   [ns]; source and gravity of the base, world axes. */
 enum { MOST_WAITING = 1000 };
 int64_t input_stream_size(void);
 void begin_stream(
-  uint8_t * memory, const int64_t * widths, int64_t tolerance, int64_t timeout,
-  int64_t base_timeout, int64_t source, const double * gravity, const imu_mounting * imu);
+  uint8_t * memory, input_topic * topics, const int64_t * widths, int64_t tolerance,
+  int64_t timeout, int64_t base_timeout, int64_t source, const double * gravity,
+  const imu_mounting * imu);
 
-/* The layout of the messages of a topic, as for read_messages: the arrays stay where they are. */
-void put_layout(
-  uint8_t * memory, int64_t topic, int64_t size, const uint8_t * message, const uint8_t * fixed,
-  int64_t n_parts, const message_part * parts, int64_t quaternion, int64_t n_measured,
-  const int64_t * measured, double largest);
+/* The platform that answers setpoints, and the messages of an answer, as for write_messages: the
+   arrays stay where they are. The state of the step stays as it is. */
+void put_answers(
+  uint8_t * memory, const stewart_platform * platform, const stewart_platform * servos,
+  int64_t size, const uint8_t * message, int64_t n_stamps, const int64_t * stamp_places,
+  int64_t n_parts, const message_part * parts, int64_t n_kinds,
+  const message_condition * conditions);
 
-/* Join messages (count,) of topics, -1: not used, recorded at times [ns], each at its place in the
-   data, from progress->next on. Setpoints have their stamps [ns] and the index of the message that
-   completed each; samples of the base their stamps, motions, numbers and whether time jumped back. */
-void join_messages(
-  uint8_t * memory, int64_t count, const int64_t * topics, const int64_t * times,
-  const uint8_t * data, const int64_t * starts, const int64_t * sizes, given_sample * given,
-  int64_t * stamps, setpoint * setpoints, int64_t * places, int64_t * base_stamps,
-  stewart_base * bases, double * base_values, double * base_restarts, int64_t event_room,
-  input_event * events, join_progress * progress);
+/* Memory of messages and what they complete, which stays where it is. Messages: their topics, -1: not
+   used, times of recording [ns], places in the data. Setpoints: their stamps [ns] and the index of
+   the message that completed each; samples of the base: their stamps, motions, numbers and whether
+   time jumped back; outputs and messages of answers: needed after put_answers. */
+void put_memory(
+  uint8_t * memory, const int64_t * topics, const int64_t * times, const int64_t * starts,
+  const int64_t * sizes, const uint8_t * data, int64_t * stamps, setpoint * setpoints,
+  int64_t * places, int64_t * base_stamps, stewart_base * bases, double * base_values,
+  double * base_restarts, stewart_output * outputs, uint8_t * messages, uint8_t * having,
+  int64_t event_room, input_event * events, join_progress * progress);
+
+/* Join the messages in memory from progress->next on, and answer the setpoints that they complete.
+   Answer the setpoints in memory. */
+void join_messages(uint8_t * memory);
+void answer_setpoints(uint8_t * memory);
 
 /* Drop what waits of a group, setpoints (0) or base (1); with `restart`, samples of any time follow,
    and the next setpoint is a restart. */
-void end_stream(
-  uint8_t * memory, int64_t group, int64_t restart, input_event * events, int64_t * n_events);
+void end_stream(uint8_t * memory, int64_t group, int64_t restart);
 
 /* The motion of the base at a stamp, nan if unknown. The last one; returns whether there is one. */
 void base_at(const uint8_t * memory, int64_t stamp, stewart_base * base);
@@ -228,12 +280,12 @@ void last_wrench(const uint8_t * memory, double * wrench);
 
 /* Messages (count, size), all kinds side by side: copies of one row of them, with stamps (count,)
    [ns] at some places and numbers of rows (count, width) at others; which kinds (count, n_kinds) a
-   row has, and the numbers (n_kinds,) of messages. */
+   row has. With servos rows are outputs, and six columns behind them their pulse widths. */
 void write_messages(
-  int64_t size, const uint8_t * message, int64_t n_stamps, const int64_t * stamp_places,
-  int64_t n_parts, const message_part * parts, int64_t n_kinds,
+  const stewart_platform * servos, int64_t size, const uint8_t * message, int64_t n_stamps,
+  const int64_t * stamp_places, int64_t n_parts, const message_part * parts, int64_t n_kinds,
   const message_condition * conditions, int64_t width, int64_t count, const int64_t * stamps,
-  const double * rows, uint8_t * messages, uint8_t * having, int64_t * numbers);
+  const double * rows, uint8_t * messages, uint8_t * having);
 
 /* Positions of the drives (count, 6) in poses: leg lengths [m] or angles of cranks [rad], nan where
    a rod does not reach. */

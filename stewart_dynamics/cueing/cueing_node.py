@@ -27,8 +27,8 @@ from stewart_dynamics.mechanics.frames.rotation import quaternion_of
 from stewart_dynamics.mechanics.limits import short_name
 from stewart_dynamics.mechanics.rows import MOTION, ROTATION, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.messages.cdr import MalformedError
-from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
+from stewart_dynamics.messages.joint_state import JointStateReader
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.setpoint import ImuWriter
 from stewart_dynamics.node.diagnostics.levels import ERROR, LogLine, OK, Status, WARN
 from stewart_dynamics.node.publishers_at_rate import diagnostic_array
@@ -135,16 +135,18 @@ class CueingNode(ManagedNode[CueingParameters]):
             return
         platform = StewartPlatform(self._settings)
         try:
-            samples = self._legs.read(data)
-            if not samples:
-                return  # a part: the others follow
+            states = self._legs.read_states(Messages.single(MEASURED_LEGS, data))
+            if not len(states.stamps):
+                if states.rejected:  # else a part: the others follow
+                    self._rejections.reject(MEASURED_LEGS, *states.last)
+                return
             if self._tried:  # an attempt takes longer than the period of fast legs
                 return
-            positions = np.array(samples[-1][1]) + self._settings.geometry.zero_length
+            positions = states.values[-1] + self._settings.geometry.zero_length
             away = np.abs(positions - platform.inverse_kinematics(self._cueing.governor.home))
             pose = (self._cueing.governor.home if away.max() < _AWAY
                     else platform.forward_kinematics(positions))
-        except (MalformedError, JointStateError, StewartError) as exc:
+        except StewartError as exc:
             self._rejections.reject(MEASURED_LEGS, MALFORMED, str(exc))
             return
         self._start_from(Motion.from_pose(pose))

@@ -79,7 +79,7 @@ def _read_bag(path: Path, given: str | None, reading: Reading) -> RecordedVehicl
             type_names.IMU, given, f'/stewart_cueing/{VEHICLE}', '--vehicle')
 
         def add(messages: Messages) -> None:
-            samples = reader.read_samples(messages.data, messages.starts, messages.sizes)
+            samples = reader.read_samples(messages)
             received = messages.times[samples.places]
             for stamp, time, row in zip(samples.stamps.tolist(), received.tolist(),
                                         samples.values.tolist(), strict=True):

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array, SECOND
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.stamp_order import NO_STAMP
 from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE
 from stewart_dynamics.possible_errors.transforms import axes_and_signs
@@ -196,12 +197,13 @@ class Vehicle:
 
     def take(self, data: bytes, now: float) -> None:
         """Take a message at a time [s]."""
-        read = self._reader.read_sample(data)
-        if read is None or not self._in_order(read[0]):
+        samples = self._reader.read_samples(Messages.single(VEHICLE, data))
+        if not len(samples.stamps) or not self._in_order(int(samples.stamps[0])):
             return
-        rates, forces = read[1][:3], read[1][3:]
-        if max(map(abs, read[1])) > 1e4:
-            self._rejections.reject(VEHICLE, 'out of range', f'{read[1]}: must be at most 1e4')
+        values = tuple(samples.values[0].tolist())
+        rates, forces = values[:3], values[3:]
+        if max(map(abs, values)) > 1e4:
+            self._rejections.reject(VEHICLE, 'out of range', f'{values}: must be at most 1e4')
             return
         self.reading, self.heard = (*forces, *rates), now
         self._recent.append(now)

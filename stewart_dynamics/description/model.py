@@ -44,12 +44,13 @@ class ModelMessages:
 
     def joint_states(self, stamp: int, pose: Sequence[float]) -> bytes:
         """Return the sensor_msgs/JointState of all joints at a pose, as in a row of motion."""
-        return self._positions.write_one(stamp, self._joints.of_sample(pose))
+        return self._positions.write(
+            [stamp], [self._joints.of_sample(pose)]).tobytes()
 
     def transform(self, stamp: int, pose: Sequence[float]) -> bytes:
         """Return the tf2_msgs/TFMessage from ``base_frame`` to ``platform_frame`` at a pose."""
-        return self._transform.write_one(
-            stamp, (*pose[POSITION], *quaternion_of(pose[ROTATION])))
+        return self._transform.write(
+            [stamp], [(*pose[POSITION], *quaternion_of(pose[ROTATION]))]).tobytes()
 
 
 class LinkTransforms:

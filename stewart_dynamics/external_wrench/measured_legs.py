@@ -24,15 +24,15 @@ from stewart_dynamics.external_wrench.rate_check import RateCheck
 from stewart_dynamics.mechanics.drives.measured_efforts import (
     force_per_effort, has_losses, STAMPS, without_losses)
 from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, NO_BASE, TWIST, WRENCH
-from stewart_dynamics.messages.cdr import MalformedError
-from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
+from stewart_dynamics.messages.joint_state import JointStateReader
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.stamp_order import NO_STAMP
 from stewart_dynamics.parameters.table import MOTOR_CURRENTS, MOTOR_TORQUES, Parameters
 from stewart_dynamics.possible_errors.hypothesis import PossibleError
 from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.rejections import (
-    BASE_NOT_KNOWN, check_stamp, MALFORMED, OUT_OF_RANGE, Rejection, stamp_words)
+    BASE_NOT_KNOWN, check_stamp, OUT_OF_RANGE, Rejection, stamp_words)
 
 # A row: the stamp [ns, an integer], pose and twist as in a row of motion, the forces that acted
 # since the measurement before [N], the known load, the motion of the base.
@@ -211,7 +211,7 @@ class MeasuredLegs:
             return None
         self._efforts.add(last.stamp, measurement.efforts, last.differences)
         self._rates.add(measurement, last)
-        self._stamps.add(last.stamp, measurement.positions)
+        self._stamps.add_readings([last.stamp], [measurement.positions])
         mistake = self.mistake
         self._last = last if mistake is None else last._replace(mistake=mistake)
         if self._history is not None:
@@ -223,16 +223,12 @@ class MeasuredLegs:
 
     def _measurements(self, data: bytes) -> Iterator[Measurement]:
         """Yield the measurements that a message completes, or reject it."""
-        try:
-            samples = self._reader.read(data)
-        except MalformedError as exc:
-            self._reject(MALFORMED, str(exc))
-            return
-        except JointStateError as exc:
-            self._reject(exc.reason, exc.details)
-            return
+        states = self._reader.read_states(Messages.single(MEASURED_LEGS, data))
+        if states.rejected and not len(states.stamps):
+            self._reject(*states.last)
         z = self._zero_lengths
-        for stamp, p in samples:
+        for stamp, p in zip(states.stamps.tolist(), map(tuple, states.values.tolist()),
+                            strict=True):
             if stamp == NO_STAMP:
                 self._reject(UNSTAMPED, 'accelerations need the time between two messages')
                 continue

@@ -83,8 +83,7 @@ class RecordedLegs:
     def _read_states(self, key: str, messages: Messages) -> None:
         if key not in self._readers:
             self._readers[key] = self._reader(key, messages)
-        stamps, values, rejected = self._readers[key].read_many(
-            messages.data, messages.starts, messages.sizes)
+        stamps, values, _, rejected, _ = self._readers[key].read_states(messages)
         sound = (np.abs(values) < NUMBERS_END).all(axis=1) & (stamps > 0)
         self.rejected.update(rejected)
         if not sound.all():
@@ -100,8 +99,7 @@ class RecordedLegs:
             return JointStateReader(self._joints, ['effort'])
         efforts = ['effort'] if self._one else []
         reader = JointStateReader(self._joints, ['position', 'velocity', *efforts])
-        _, _, first = next(messages.each())
-        self.rates = reader.reads_all(first)
+        self.rates = not reader.read_states(messages.chosen(slice(1))).rejected
         return reader if self.rates else JointStateReader(self._joints, ['position', *efforts])
 
     def _released(self, last: bool) -> Iterator[Window]:

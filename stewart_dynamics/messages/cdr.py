@@ -5,20 +5,19 @@
 The common parts of all messages as bytes: byte order, stamps, texts and sequences.
 
 ROS 2 sends messages as XCDR1 ("plain CDR"): four bytes that give the byte order, then the
-fields, each aligned to its own size (OMG DDS-XTypes 1.3, 7.4.3). Reading and writing the few
-messages of the hot path in this package takes a tenth of the time of rclpy's typed messages and
-needs no ROS; node and replay read and write the same bytes.
+fields, each aligned to its own size (OMG DDS-XTypes 1.3, 7.4.3). Messages of setpoints, base,
+wrench and legs are read in C, core/messages.c: it takes a hundredth of the time of rclpy's typed
+messages and needs no ROS; node and replay read and write the same bytes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-import math
 from struct import error as StructError
 from struct import Struct
 from typing import NamedTuple
 
 from stewart_dynamics.arrays import SECOND
+from stewart_dynamics.core.binding import CODES
 
 LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 
@@ -27,7 +26,6 @@ _TIME = Struct('<iI')
 ORDERS = {0: '>', 1: '<'}
 TIME_AND_LENGTH = {0: Struct('>iII'), 1: Struct('<iII')}
 COUNT = {0: Struct('>I'), 1: Struct('<I')}
-SIX = {0: Struct('>6d'), 1: Struct('<6d')}
 SEVEN = {0: Struct('>7d'), 1: Struct('<7d')}
 
 # Errors of reading fields at wrong places: handled by the reader of the whole message.
@@ -36,15 +34,35 @@ READ_ERRORS = IndexError, KeyError, StructError
 
 # Names, dimensions or numbers in a message of six legs: reading millions of them would delay all
 # messages after it.
-MOST_ENTRIES = 1000
+MOST_ENTRIES = CODES['MOST_ENTRIES']
 
 # Why a message of any type is rejected.
 MALFORMED = 'malformed'
 NOT_FINITE = 'not finite'
 
 
+_FAULTS = {CODES[f'FAULT_{name}']: words for name, words in {
+    'NANOSECONDS': 'stamp of {number} ns: must be under 1000000000',
+    'TEXT': 'a string does not end in a zero byte',
+    'SEQUENCE': 'a sequence of {number} in {size} bytes',
+    'ENTRIES': f'a sequence of {{number}}: must be at most {MOST_ENTRIES}',
+    'NAMES': '{number} joint_names: must be at most 1',
+    'POINTS': '{number} points: a setpoint has one',
+    'TRANSFORMS': '{number} transforms: a setpoint has one',
+    'VELOCITIES': '{number} velocities: a setpoint has one',
+    'ACCELERATIONS': '{number} accelerations: a setpoint has one',
+    'SHORTER': '{size} bytes: must be at least {number}'}.items()}
+
+
 class MalformedError(ValueError):
     """Bytes that are not a message of the expected type."""
+
+
+def fault_of(data: bytes | memoryview, fault: int, number: int) -> MalformedError:
+    """Return the error of bytes in which core/messages.c has found a fault, with its number."""
+    words = _FAULTS.get(fault)
+    return unreadable(data) if words is None else MalformedError(
+        words.format(number=number, size=len(data)))
 
 
 class Stamped(NamedTuple):
@@ -60,13 +78,13 @@ def aligned8(offset: int) -> int:
     return (offset + 3 & ~7) + 4
 
 
-def check_encapsulation(data: bytes) -> None:
+def check_encapsulation(data: bytes | memoryview) -> None:
     """Raise MalformedError where a message is not plain CDR."""
     if data[0] != 0 or data[1] not in ORDERS:
         raise MalformedError(f'encapsulation {data[:2].hex()} is not plain CDR')
 
 
-def unreadable(data: bytes) -> MalformedError:
+def unreadable(data: bytes | memoryview) -> MalformedError:
     """Return the error of bytes that are not plain CDR, or that end before the message does."""
     try:
         check_encapsulation(data)
@@ -103,40 +121,26 @@ def text(data: bytes, start: int, size: int) -> bytes:
     return data[start:start + size - 1]
 
 
-def sequence(data: bytes, at: int, count: Struct, gaps: list[slice]) -> tuple[int, int]:
+def sequence(data: bytes, at: int, count: Struct) -> tuple[int, int]:
     """
     Return a sequence's length, and where its first entry begins.
 
     at: where the field before it ends.
     count: one of COUNT.
-    gaps: added to: the bytes before it that only align it.
     """
     begin = at + 3 & ~3
-    gaps.append(slice(at, begin))
     number = count.unpack_from(data, begin)[0]
     if number > len(data):
         raise MalformedError(f'a sequence of {number} in {len(data)} bytes')
     return number, begin + 4
 
 
-def short_sequence(data: bytes, at: int, count: Struct, gaps: list[slice]) -> tuple[int, int]:
+def short_sequence(data: bytes, at: int, count: Struct) -> tuple[int, int]:
     """Do the same as ``sequence``, for one of at most MOST_ENTRIES."""
-    number, begin = sequence(data, at, count, gaps)
+    number, begin = sequence(data, at, count)
     if number > MOST_ENTRIES:
         raise MalformedError(f'a sequence of {number}: must be at most {MOST_ENTRIES}')
     return number, begin
-
-
-def stamped(data: bytes, numbers: dict[int, Struct]) -> Stamped:
-    """Read a message that has a header, then numbers: a Struct for each byte order."""
-    try:
-        order = data[1]
-        sec, nanosec, size = TIME_AND_LENGTH[order].unpack_from(data, 4)
-        end = 16 + size
-        values = numbers[order].unpack_from(data, aligned8(end))
-    except READ_ERRORS as exc:
-        raise unreadable(data) from exc
-    return Stamped(nanoseconds(data, sec, nanosec), text(data, 16, size), values)
 
 
 def header(stamp: int, frame: str = '') -> bytearray:
@@ -156,9 +160,3 @@ def put_text(body: bytearray, written: str) -> None:
     encoded = written.encode() + b'\x00'
     put_count(body, len(encoded))
     body += encoded
-
-
-def finite(values: Sequence[float]) -> bool:
-    """Return whether all numbers are finite."""
-    # A sum is not finite where one of its terms is not; it may also overflow.
-    return math.isfinite(sum(values)) or all(map(math.isfinite, values))

@@ -51,9 +51,9 @@ class JointParts:
         self._leader = -1  # the joint whose stamps are those of the samples
         self._due: deque[int] = deque()  # its stamps that are not joined yet
 
-    def add(self, stamp: int, joints: Sequence[int], values: Sequence[float]) -> Joined:
+    def join_part(self, stamp: int, joints: Sequence[int], values: Sequence[float]) -> Joined:
         """
-        Add a message.
+        Return what a message completes.
 
         joints (n,): places of its joints.
         values (n fields): of all of its joints in one field, then in the next.
@@ -74,9 +74,9 @@ class JointParts:
             self._due.clear()
         if self._leader in joints:
             self._due.append(stamp)
-        return self._joined(stamp)
+        return self._complete_samples(stamp)
 
-    def _joined(self, newest: int) -> Joined:
+    def _complete_samples(self, newest: int) -> Joined:
         found = Joined([], [])
         while self._due:
             at = self._due[0]
@@ -88,14 +88,14 @@ class JointParts:
             for series in self._series:
                 while len(series) > 1 and series[1][0] <= at:
                     series.popleft()
-            values = None if waiting else self._at(at)
+            values = None if waiting else self._values_at(at)
             if values is not None:
                 found.samples.append((at, values))
             elif waiting:
                 found.lacking.append(f'{", ".join(waiting)} for {self._gap * NANOSECOND:g} s')
         return found
 
-    def _at(self, stamp: int) -> tuple[float, ...] | None:
+    def _values_at(self, stamp: int) -> tuple[float, ...] | None:
         """Return the values at a stamp; None before the first sample of a joint, or in a gap."""
         of_joints = []
         for series in self._series:

@@ -13,6 +13,8 @@ import numpy as np
 from stewart_dynamics.arrays import Bytes, Integers, Stamps
 from stewart_dynamics.messages.layout import at_any_byte
 
+_FIRST: Integers = np.zeros(1, np.int64)
+
 
 class Messages(NamedTuple):
     """M recorded messages in the order of time, and the bytes that contain them."""
@@ -32,6 +34,12 @@ class Messages(NamedTuple):
         return cls(topics, np.array(of_topic, dtype=np.int64), np.array(times, dtype=np.int64),
                    np.frombuffer(bytearray(b''.join(messages)), dtype=np.uint8),
                    np.cumsum(sizes) - sizes, sizes)
+
+    @classmethod
+    def single(cls, topic: str, data: bytes) -> Messages:
+        """Return one message of a topic."""
+        return cls((topic,), _FIRST, _FIRST, np.frombuffer(data, np.uint8), _FIRST,
+                   np.array([len(data)]))
 
     def chosen(self, which: Any) -> Messages:
         """Return some of the messages: a slice, or an index or a mask (M,)."""
@@ -54,6 +62,18 @@ class Messages(NamedTuple):
             at_any_byte(data, size)[starts[which]] = at_any_byte(self.data, size)[
                 self.starts[which]]
         return self._replace(data=data, starts=starts)
+
+    def places_in_data(self) -> tuple[Bytes, Integers, Integers]:
+        """Return data, starts and sizes as C takes them."""
+        return self.data, np.ascontiguousarray(self.starts), np.ascontiguousarray(self.sizes)
+
+    def bytes_of(self, n: int) -> bytes:
+        """Return the bytes of a message."""
+        return bytes(self.view_of(n))
+
+    def view_of(self, n: int) -> memoryview:
+        """Return the bytes of a message, however many, without a copy."""
+        return self.data[self.starts[n]:self.starts[n] + self.sizes[n]].data
 
     def each(self) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, time and bytes of each message."""

@@ -10,86 +10,61 @@ trajectory_msgs/MultiDOFJointTrajectory of one point.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from struct import Struct
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
-from stewart_dynamics.messages.cdr import (
-    aligned8, COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, READ_ERRORS, sequence,
-    SEVEN, SIX, Stamped, stamped, text, TIME_AND_LENGTH, unreadable)
+import numpy as np
+
+from stewart_dynamics.core.binding import CODES, function, record
+from stewart_dynamics.messages import type_names
+from stewart_dynamics.messages.cdr import fault_of, header, LITTLE_ENDIAN
 from stewart_dynamics.messages.layout import Layout
-from stewart_dynamics.messages.trajectory_layouts import points_of
 
-_IMU = {0: Struct('>37d'), 1: Struct('<37d')}
-_DURATION = {0: Struct('>iI'), 1: Struct('<iI')}
-
-
-def pose(data: bytes) -> Stamped:
-    """Read a geometry_msgs/PoseStamped: x y z and the quaternion's x y z w."""
-    return stamped(data, SEVEN)
-
-
-def twist(data: bytes) -> Stamped:
-    """Read a TwistStamped, AccelStamped or WrenchStamped: two vectors x y z."""
-    return stamped(data, SIX)
+# Types in C, and how many numbers each part of a message has.
+_TYPES = {
+    type_names.POSE_STAMPED: ('POSE', (7,)), type_names.TWIST_STAMPED: ('TWIST', (6,)),
+    type_names.ACCEL_STAMPED: ('TWIST', (6,)), type_names.WRENCH_STAMPED: ('TWIST', (6,)),
+    type_names.IMU: ('IMU', (37,)),
+    type_names.MULTI_DOF_JOINT_TRAJECTORY: ('COMBINED', (7, 6, 6))}
+MESSAGE_TYPES = {kind: CODES[f'MESSAGE_{name}'] for kind, (name, _) in _TYPES.items()}
+"""The types that are a header and numbers, as C knows them."""
 
 
-def imu(data: bytes) -> Stamped:
+class StampedNumbers(NamedTuple):
     """
-    Read a sensor_msgs/Imu: 37 numbers.
+    A message with a header: its stamp, its frame and its numbers.
 
-    They are the orientation x y z w, the angular velocity and the linear acceleration x y z, each
-    with the nine numbers of its covariance behind it.
+    Numbers of a PoseStamped: x y z and the quaternion's x y z w; of a TwistStamped, AccelStamped
+    or WrenchStamped: two vectors x y z; of an Imu: the orientation x y z w, the angular velocity
+    and the linear acceleration x y z, each with the nine numbers of its covariance behind it; of
+    a MultiDOFJointTrajectory of one point and one joint: position, quaternion, twist,
+    acceleration.
     """
-    return stamped(data, _IMU)
+
+    stamp: int  # [ns]
+    frame: bytes
+    values: tuple[float, ...]
+    parts: tuple[tuple[int, int], ...]
+    """Where the parts of the numbers stand in the bytes, and how many they are."""
 
 
-def combined(data: bytes) -> Stamped:
-    """
-    Read a trajectory_msgs/MultiDOFJointTrajectory of one point and one joint.
-
-    The 19 values are position, quaternion x y z w, twist and acceleration.
-    """
-    try:
-        order = data[1]
-        sec, nanosec, size = TIME_AND_LENGTH[order].unpack_from(data, 4)
-        values: tuple[float, ...] = ()
-        for at, layout in zip(_combined_numbers(data), (SEVEN, SIX, SIX), strict=True):
-            values += layout[order].unpack_from(data, at)
-        # time_from_start: not used, but it must be there
-        _DURATION[order].unpack_from(data, at + layout[order].size)
-    except READ_ERRORS as exc:
-        raise unreadable(data) from exc
-    return Stamped(nanoseconds(data, sec, nanosec), text(data, 16, size), values)
+def read_message(kind: str, data: bytes) -> StampedNumbers:
+    """Return what a message of one of MESSAGE_TYPES says; MalformedError if it is none."""
+    counts = _TYPES[kind][1]
+    content: Any = np.zeros(1, record('message_content'))
+    numbers = np.empty(sum(counts))
+    function('read_message')(
+        MESSAGE_TYPES[kind], len(data), np.frombuffer(data, np.uint8), content, numbers)
+    stamp, fault, number, size, places = content[0].tolist()
+    if fault:
+        raise fault_of(data, fault, number)
+    return StampedNumbers(stamp, data[16:16 + size], tuple(numbers.tolist()),
+                          tuple(zip(places, counts, strict=False)))
 
 
-def _combined_numbers(data: bytes, gaps: list[slice] | None = None) -> list[int]:
-    """Return where transform, velocity and acceleration begin; note what only aligns."""
-    gaps = [] if gaps is None else gaps
-    count = COUNT[data[1]]
-    _, points, at = points_of(data, gaps)
-    if points != 1:
-        raise MalformedError(f'{points} points: a setpoint has one')
-    found = []
-    for name, layout in (('transforms', SEVEN), ('velocities', SIX), ('accelerations', SIX)):
-        number, at = sequence(data, at, count, gaps)
-        if number != 1:
-            raise MalformedError(f'{number} {name}: a setpoint has one')
-        found.append(aligned8(at))
-        gaps.append(slice(at, found[-1]))
-        at = found[-1] + layout[data[1]].size
-    return found
-
-
-def layout_of(reader: Callable[[bytes], Stamped], message: bytes) -> Layout:
-    """Return the layout of a message that one of these readers has read."""
-    if reader is combined:
-        gaps: list[slice] = []
-        numbers = zip(_combined_numbers(message, gaps), (7, 6, 6), strict=True)
-        return Layout(message, list(numbers), gaps=gaps)
-    end = 16 + COUNT[message[1]].unpack_from(message, 12)[0]
-    at = aligned8(end)
-    length = 7 if reader is pose else 37 if reader is imu else 6
-    return Layout(message, [(at, length)], gaps=[slice(end, at)])
+def layout_of(kind: str, message: bytes) -> Layout:
+    """Return the layout of messages like one of MESSAGE_TYPES."""
+    return Layout(message, read_message(kind, message).parts)
 
 
 class StampedWriter:
@@ -102,7 +77,7 @@ class StampedWriter:
 
     def write(self, stamp: int, values: Sequence[float]) -> bytes:
         """Return the message."""
-        return self.layout.write_one(stamp, values)
+        return self.layout.write([stamp], [values]).tobytes()
 
 
 _NUMBERS = 37

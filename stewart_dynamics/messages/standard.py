@@ -53,12 +53,12 @@ def float64_values(data: bytes) -> tuple[float, ...]:
     try:
         order = data[1]
         count = COUNT[order]
-        dimensions, at = short_sequence(data, 4, count, [])
+        dimensions, at = short_sequence(data, 4, count)
         for _ in range(dimensions):
-            size, at = sequence(data, at, count, [])
+            size, at = sequence(data, at, count)
             at = (at + size + 3 & ~3) + 8
         # data_offset comes before the numbers
-        number, at = short_sequence(data, (at + 3 & ~3) + 4, count, [])
+        number, at = short_sequence(data, (at + 3 & ~3) + 4, count)
         values: tuple[float, ...] = Struct(f'{ORDERS[order]}{number}d').unpack_from(
             data, aligned8(at) if number else at)
     except READ_ERRORS as exc:

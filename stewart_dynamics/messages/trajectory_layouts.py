@@ -46,26 +46,6 @@ _LEG_POINT = {effort: np.dtype({
     for effort, end in ((True, 168), (False, 120))}
 
 
-def points_of(data: bytes, gaps: list[slice], most_joints: int = 1,
-              ) -> tuple[list[bytes], int, int]:
-    """
-    Return joint_names and number of points of a MultiDOFJointTrajectory, and where they begin.
-
-    Bytes before the points that only align are added to the gaps.
-    """
-    count = COUNT[data[1]]
-    size = count.unpack_from(data, 12)[0]
-    joints, at = sequence(data, 16 + size, count, gaps)
-    if joints > most_joints:
-        raise MalformedError(f'{joints} joint_names: must be at most {most_joints}')
-    names = []
-    for _ in range(joints):
-        length, at = sequence(data, at, count, gaps)
-        names.append(text(data, at, length))
-        at += length
-    return names, *sequence(data, at, count, gaps)
-
-
 class PlatformTrajectory:
     """
     Reads a trajectory_msgs/MultiDOFJointTrajectory of one or two joints and any number of points.
@@ -77,7 +57,16 @@ class PlatformTrajectory:
         try:
             order = data[1]
             sec, nanosec, size = TIME_AND_LENGTH[order].unpack_from(data, 4)
-            self.names, self.size, self._first = points_of(data, [], 2)
+            count = COUNT[order]
+            joints, at = sequence(data, 16 + size, count)
+            if joints > 2:
+                raise MalformedError(f'{joints} joint_names: must be at most 2')
+            self.names = []
+            for _ in range(joints):
+                length, at = sequence(data, at, count)
+                self.names.append(text(data, at, length))
+                at += length
+            self.size, self._first = sequence(data, at, count)
         except READ_ERRORS as exc:
             raise unreadable(data) from exc
         self.stamp = nanoseconds(data, sec, nanosec)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 import math
 import time
@@ -47,7 +47,7 @@ from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, NOT_EXCLUSIVE, Rejection, stamp_words)
-from stewart_dynamics.setpoints.step import Batch, EXCEEDING, FIRST, Outputs, Step
+from stewart_dynamics.setpoints.step import Batch, EXCEEDING, Outputs, Step
 from stewart_dynamics.setpoints.unanswered import unanswered
 
 
@@ -64,14 +64,13 @@ class _Models(NamedTuple):
     """Models that share one set of parameters."""
 
     step: Step
-    write_answer: Callable[[], dict[str, bytes]]  # the messages of the step's last answer
+    messages: OutputMessages
     external_wrench: ExternalWrench
     base_wrench: BaseWrench
 
     @classmethod
     def of(cls, parameters: Parameters) -> _Models:
-        step = Step(parameters)
-        return cls(step, OutputMessages(parameters).bound_to(step), ExternalWrench(parameters),
+        return cls(Step(parameters), OutputMessages(parameters), ExternalWrench(parameters),
                    BaseWrench(parameters))
 
 
@@ -108,6 +107,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         parameters, models = self._settings, self._models
         self._identified = None
         self._setpoints = Setpoints(parameters, self._on_rejection, self._on_notice)
+        self._setpoints.answer_setpoints(models.step, models.messages, self._publish_answer)
         self._history = LegHistory(parameters.payload.window)
         self._measured_legs = MeasuredLegs(
             parameters, models.external_wrench, self._on_rejection, self._on_notice,
@@ -117,7 +117,6 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._heard = self._diagnostics.setpoints.heard
         self._waiting: list[tuple[Batch, float]] = []  # single setpoints, and times of arrival
         self._gathering = False  # a task answers them after the messages received
-        self._state = FIRST  # of the step
         self._last: tuple[Batch, Outputs] | None = None  # the last answered setpoint
         self._answered: dict[str, bytes] = {}  # its messages, with use_sim_time
         publishers, rate = self._topics.publishers, parameters.visualization_rate
@@ -134,7 +133,6 @@ class DynamicsNode(ManagedNode[Parameters]):
         begun = time.monotonic()
         self._models = SIGNALS.interruptible(partial(_Models.of, self._settings))
         self.get_logger().info(f'dynamics ready after {time.monotonic() - begun:.1f} s')
-        self._messages = OutputMessages(self._settings)
         self._model_messages = ModelMessages(self._settings)
         self._topics.make(self._settings, self._on_setpoint, self._on_base, {
             WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
@@ -184,11 +182,14 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._heard[topic] = came
         self._rested = self._rested or came - self._handled > _REST
         if not self._exclusive or self._is_only_writer(topic):
+            self._setpoints.hold_answers(self._gathering)
             setpoint = self._setpoints.join_message(topic, data, self._ros_time)
             if len(setpoint.stamps):
-                self._waiting.append((setpoint, came))
-                if not self._gathering:
-                    self._answer_waiting()
+                if self._gathering:
+                    self._waiting.append((setpoint, came))
+                else:
+                    self._note_answer(setpoint, came)
+                    self._end_answers()
         self._handled = time.monotonic()
 
     def _answer_waiting(self) -> None:
@@ -203,9 +204,13 @@ class DynamicsNode(ManagedNode[Parameters]):
             return
         waiting, self._waiting = self._waiting, []
         for setpoint, came in waiting if len(waiting) <= BACKLOG else [self._newest(waiting)]:
-            self._answer(setpoint, came)
-        now = time.monotonic()
-        self._publish_due(now)
+            self._setpoints.answer_setpoint(setpoint)
+            self._note_answer(setpoint, came)
+        self._end_answers()
+
+    def _end_answers(self) -> None:
+        """Publish what is due at a rate; gather the next setpoints if these have waited."""
+        self._publish_due(time.monotonic())
         rested, self._rested = self._rested, False
         if not rested:
             self._gathering = True
@@ -220,25 +225,26 @@ class DynamicsNode(ManagedNode[Parameters]):
         restart = any(setpoint.restarts[0] for setpoint, _ in waiting)
         return newest.replaced(restarts=restart), came
 
-    def _answer(self, setpoint: Batch, came: float) -> None:
-        """Compute the answer to a single setpoint, publish it, and note it."""
-        outputs = self._models.step(setpoint, self._state)
-        self._state = outputs.state
-        if not len(outputs.stamps):
-            for reason in unanswered(self._models.step.parameters, setpoint, outputs):
-                self._setpoints.reject('setpoint', *reason)
-            return
+    def _publish_answer(self, answered: dict[str, bytes]) -> None:
+        """Publish the messages of an answer by topic."""
         publishers = self._topics.publishers
-        answered = self._models.write_answer()
         for topic, message in answered.items():
             publishers[topic].publish(message)
         if self._simulated:
             self._answered = answered
+
+    def _note_answer(self, setpoint: Batch, came: float) -> None:
+        """Note the answer to a single setpoint, or why it has none."""
+        outputs = self._setpoints.last_outputs()
+        if not len(outputs.stamps):
+            for reason in unanswered(self._models.step.parameters, setpoint, outputs):
+                self._setpoints.reject('setpoint', *reason)
+            return
         if self._base_wrench_read:
-            topic, known, messages = self._messages.of_base_wrenches(
+            topic, known, messages = self._models.messages.of_base_wrenches(
                 outputs.stamps, self._models.base_wrench(setpoint))
             if known[0]:
-                publishers[topic].publish(messages.tobytes())
+                self._topics.publishers[topic].publish(messages.tobytes())
         self._note(setpoint, outputs, came)
 
     def _note(self, setpoint: Batch, outputs: Outputs, came: float) -> None:
@@ -320,7 +326,7 @@ class DynamicsNode(ManagedNode[Parameters]):
             self._joint_states.publish_due(now)
         if estimate.published is not None:
             self._topics.publishers[EXTERNAL_WRENCH].publish(
-                self._messages.of_wrench(estimate.stamp, estimate.published))
+                self._models.messages.of_wrench(estimate.stamp, estimate.published))
         diagnostics.estimated(estimate, target and target.motion, now)
         if self._diagnostics.level_changed(now):
             self._report()
@@ -428,6 +434,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         """Use changed parameters from the next setpoint on."""
         self._models = models = _Models.of(parameters)
         if self._active:
+            self._setpoints.answer_setpoints(models.step, models.messages, self._publish_answer)
             self._measured_legs.use(parameters, models.external_wrench)
             self._diagnostics.answers.parameters = parameters
             self._markers.write = Markers(parameters).write  # a payload moves the centre of mass

@@ -125,7 +125,7 @@ class Differentiator:
             out: they would disturb the splines of all poses around them.
         """
         near = np.all(np.abs(batch.motions[:, POSITION]) <= LARGEST, axis=1)
-        self.stamps.add_many(batch.stamps, batch.motions[:, POSE])
+        self.stamps.add_readings(batch.stamps, batch.motions[:, POSE])
         if self._restart_before or not near.all():
             restarts, self._restart_before = _restarts_of(
                 batch.restarts, near, self._restart_before)

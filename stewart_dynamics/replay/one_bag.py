@@ -394,8 +394,7 @@ class _Run:
             self._first_measured = False
         if self._comparison is None:
             return
-        stamps, efforts, rejected = self._efforts.read(
-            messages.data, messages.starts, messages.sizes)
+        stamps, efforts, rejected = self._efforts.read_efforts(messages)
         for reason, number in rejected.items():
             self._setpoints.reject(MEASURED, reason, '', number)
         if self._per_effort is not None:
@@ -404,7 +403,7 @@ class _Run:
 
     def _efforts_recorded(self, messages: Messages) -> bool:
         reader = JointStateReader(self._parameters.joints, ['effort'])
-        return len(reader.read_many(messages.data, messages.starts, messages.sizes).stamps) > 0
+        return len(reader.read_states(messages).stamps) > 0
 
     def _compared(self, compared: Any) -> None:
         if self.report is not None and len(compared[0]):

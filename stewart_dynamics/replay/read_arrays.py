@@ -221,7 +221,7 @@ def read_legs(
 
         def add(messages: Messages) -> None:
             for field, reader in readers.items():
-                states = reader.read_many(messages.data, messages.starts, messages.sizes)
+                states = reader.read_states(messages)
                 found[field].append((states.stamps, states.values))
 
         read_all(recording, [Subscription({name: _LEGS}, add)])

@@ -22,9 +22,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Bytes, NANOSECOND, SECOND, Stamps
+from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.external_wrench.estimate import external_wrenches
 from stewart_dynamics.mechanics.drives.measured_efforts import (
     EffortSums, has_losses, SCALE, without_losses)
@@ -33,6 +32,7 @@ from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader, MISSING_JOINTS, NUMBERS_END
+from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.summary import COMPONENTS, key_of, unit_key
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
@@ -53,16 +53,14 @@ class Efforts:
         self._reader = JointStateReader(joints, ['effort'])
         self._lacked = 0
 
-    def read(self, data: bytes | Bytes, starts: ArrayLike, sizes: ArrayLike,
-             ) -> tuple[Stamps, Array, dict[str, int]]:
+    def read_efforts(self, messages: Messages) -> tuple[Stamps, Array, dict[str, int]]:
         """
         Return stamps (K,) [ns], efforts (K, 6) [N], and the number of rejected messages by reason.
 
-        The messages are given as in JointStateReader.read_many. Those without all joints may come
-        from another publisher, and are rejected. Raises BagError if a thousand were rejected and
-        none had all joints.
+        Messages without all joints may come from another publisher, and are rejected. Raises
+        BagError if a thousand were rejected and none had all joints.
         """
-        stamps, efforts, rejected = self._reader.read_many(data, starts, sizes)
+        stamps, efforts, _, rejected, _ = self._reader.read_states(messages)
         in_range = (np.abs(efforts) < NUMBERS_END).all(axis=1)
         if not in_range.all():
             rejected[OUT_OF_RANGE] = int(np.count_nonzero(~in_range))
@@ -137,7 +135,7 @@ class Comparison:
 
     def add_measured(self, stamps: Stamps, efforts: Array) -> Compared:
         """Add finite forces (M, 6) [N] at stamps (M,) [ns]; return the compared setpoints."""
-        self.stamps.add_many(stamps, efforts)
+        self.stamps.add_readings(stamps, efforts)
         self._samples.add(stamps, efforts)
         return self._compared()
 

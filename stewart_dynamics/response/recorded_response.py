@@ -11,7 +11,6 @@ All samples are kept until the end: 200 bytes for each setpoint and measured sam
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -89,33 +88,19 @@ class RecordedResponse:
             self._take_poses(messages)
 
     def _take_legs(self, messages: Messages) -> None:
-        stamps, times, values = [], [], []
-        rejected: Counter[str] = Counter()
-        states = self._legs.read_many(messages.data, messages.starts, messages.sizes)
-        if len(states.stamps) == len(messages.times):
-            stamps, values, times = [states.stamps], [states.values], [messages.times]
-        else:  # one by one, so that each has its time of recording
-            for n in range(len(messages.times)):
-                one = self._legs.read_many(
-                    messages.data, messages.starts[n:n + 1], messages.sizes[n:n + 1])
-                rejected.update(one.rejected)
-                if len(one.stamps):
-                    stamps.append(one.stamps)
-                    values.append(one.values)
-                    times.append(messages.times[n:n + 1])
-        for reason, number in rejected.items():
+        states = self._legs.read_states(messages)
+        for reason, number in states.rejected.items():
             self._reject(self.key, reason, '', number)
-        if not stamps:
+        if not len(states.stamps):
             return
-        rows = np.concatenate(values)
-        sound = (np.abs(rows) < NUMBERS_END).all(axis=1)
+        sound = (np.abs(states.values) < NUMBERS_END).all(axis=1)
         if not sound.all():
             self._reject(self.key, OUT_OF_RANGE, '', int(np.count_nonzero(~sound)))
-        self._measured.add(
-            np.concatenate(stamps)[sound], rows[sound], np.concatenate(times)[sound])
+        self._measured.add(states.stamps[sound], states.values[sound],
+                           messages.times[states.places[sound]])
 
     def _take_poses(self, messages: Messages) -> None:
-        poses = self._poses.read_samples(messages.data, messages.starts, messages.sizes)
+        poses = self._poses.read_samples(messages)
         if len(poses.stamps):
             self._measured.add(poses.stamps, poses.values, messages.times[poses.places])
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.setpoints.consistency import Mistake
@@ -50,8 +51,25 @@ class ArrivalStamps:
         return [] if found is None else [
             Mistake(topic, f'possible error: {found[0]}', found[1]) for topic in topics]
 
-    def add(self, stamp: int, reading: Sequence[float]) -> None:
-        """Add a reading (n,) of any units at its stamp [ns]."""
+    def add_readings(self, stamps: ArrayLike, readings: ArrayLike) -> None:
+        """Add readings (N, n) of any units at their stamps (N,) [ns]."""
+        stamps, readings = np.asarray(stamps, dtype=np.int64), np.asarray(readings)
+        steps = np.diff(stamps)
+        apart = np.flatnonzero((steps <= 0) | (steps >= _SHORTEST)) + 1
+        at, count = 0, len(stamps)
+        for end in (*apart.tolist(), count):
+            while at < end:
+                if not self._stamps:  # a block that is whole
+                    last = max(at + _FEWEST - 1, int(np.searchsorted(
+                        stamps[at:end], stamps[at] + _SHORTEST)) + at)
+                    if last < end:
+                        self._judge(stamps[at:last + 1], readings[at:last + 1])
+                        at = last + 1
+                        continue
+                self._add_reading(int(stamps[at]), readings[at].tolist())
+                at += 1
+
+    def _add_reading(self, stamp: int, reading: Sequence[float]) -> None:
         stamps = self._stamps
         if stamps and not 0 < stamp - stamps[-1] < _SHORTEST:
             stamps = self._begin()
@@ -60,23 +78,6 @@ class ArrivalStamps:
         if len(stamps) >= _FEWEST and stamp - stamps[0] >= _SHORTEST:
             self._judge(np.array(stamps), np.array(self._readings))
             self._begin()
-
-    def add_many(self, stamps: Stamps, readings: Array) -> None:
-        """Add readings (N, n) at their stamps (N,) [ns], as ``add`` does one after the other."""
-        steps = np.diff(stamps)
-        apart = np.flatnonzero((steps <= 0) | (steps >= _SHORTEST)) + 1
-        at, count = 0, len(stamps)
-        for end in (*apart.tolist(), count):
-            while at < end:
-                if not self._stamps:
-                    last = max(at + _FEWEST - 1, int(np.searchsorted(
-                        stamps[at:end], stamps[at] + _SHORTEST)) + at)
-                    if last < end:
-                        self._judge(stamps[at:last + 1], readings[at:last + 1])
-                        at = last + 1
-                        continue
-                self.add(int(stamps[at]), readings[at].tolist())
-                at += 1
 
     def _begin(self) -> list[int]:
         self._stamps, self._readings = [], []

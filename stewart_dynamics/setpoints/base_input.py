@@ -83,10 +83,8 @@ class BaseInput:
         stamps, values = joined.base_stamps, joined.base_values
         if not len(stamps):
             return
-        for stamp, row, numbers in zip(stamps.tolist(), joined.base_rows.tolist(),
-                                       values.tolist(), strict=True):
-            self._stamps.add(stamp, numbers)
-            if self._gravity is not None:
-                self._gravity.add(stamp, row)
+        self._stamps.add_readings(stamps, values)
+        if self._gravity is not None:
+            self._gravity.add_samples(stamps.tolist(), joined.base_rows.tolist())
         if self.consistency is not None:
             self.consistency.note(stamps.copy(), values.copy(), joined.base_restarts > 0.0)

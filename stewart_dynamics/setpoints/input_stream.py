@@ -5,8 +5,7 @@
 The stream of messages of setpoints, base and external wrench, joined by stamp: core/joining.c.
 
 Node and replay pass the same bytes in the same order, the node one message, the replay a block;
-any division into blocks gives the same. C reads messages of the layout that a topic had before.
-Others, and those that are not valid, are read field by field here, which also words the events.
+any division into blocks gives the same. In the node setpoints are answered in the same call.
 """
 
 from __future__ import annotations
@@ -20,13 +19,15 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Integers, SECOND, Six, Stamps
 from stewart_dynamics.core.binding import CODES, function, record
 from stewart_dynamics.mechanics.rows import BASE
+from stewart_dynamics.messages.layout import MessageRows
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import AT_REST, BY_IMU, FIXED, MOVING, Parameters
-from stewart_dynamics.setpoints.input_messages import (
-    BASE_SOURCES, MessageLayout, SampleReader, WRENCH)
+from stewart_dynamics.setpoints.input_messages import BASE_SOURCES, SampleReader, WRENCH
+from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import (
     jumped_back, NOT_JOINED, Rejections, stamp_words, STAMP_ZERO, TOO_OLD, too_old, TWICE)
-from stewart_dynamics.setpoints.step import SETPOINT
+from stewart_dynamics.setpoints.step import (
+    ANSWERED, Batch, FIRST, OUTPUT, Outputs, SETPOINT, Step)
 
 # Maximum number of samples of a topic that wait for samples of the other topics, and depth of the
 # queues in the middleware, which may deliver all messages of one topic before another topic's.
@@ -39,20 +40,19 @@ _BASE_TOPIC, _WRENCH_TOPIC, _GROUP = 3, 6, 3
 _SETPOINTS, _BASE = 0, 1  # groups of topics
 _SOURCES = {FIXED: 0, AT_REST: CODES['BASE_AT_REST'], MOVING: CODES['BASE_MOVING'],
             BY_IMU: CODES['BASE_BY_IMU']}
-_DONE, _UNREAD, _CLOCK = (CODES[f'JOIN_{name}'] for name in ('DONE', 'UNREAD', 'CLOCK'))
-_VALID, _REJECTED = CODES['SAMPLE_VALID'], CODES['SAMPLE_REJECTED']
+_DONE, _CLOCK = CODES['JOIN_DONE'], CODES['JOIN_CLOCK']
 (_TWICE, _TOO_OLD, _NOT_JOINED, _UNSTAMPED_DROPPED, _ENDED, _BEFORE_RESTART, _RESTART,
  _NOTICE_UNSTAMPED) = (CODES[f'EVENT_{name}'] for name in (
      'TWICE', 'TOO_OLD', 'NOT_JOINED', 'UNSTAMPED_DROPPED', 'ENDED', 'BEFORE_RESTART', 'RESTART',
      'NOTICE_UNSTAMPED'))
 # Places of join_progress as integers.
-_NEXT, _N_SETPOINTS, _N_BASES, _N_EVENTS, _STATUS, _TIMED = range(6)
+_COUNT, _NEXT, _N_SETPOINTS, _N_BASES, _N_EVENTS, _STATUS, _TIMED, _HELD = range(8)
 _EVENTS = 8192
-_FEWEST_BYTES = 4096  # of the memory of a message
+_FEWEST_BYTES = 4096  # of the memory of messages
 
 
 class Joined(NamedTuple):
-    """Setpoints and samples of the base that messages complete."""
+    """Setpoints and samples of the base that messages complete; valid until the next call."""
 
     stamps: Stamps  # (N,) [ns]
     rows: Array  # (N, SETPOINT), the structure ``setpoint`` in C
@@ -81,118 +81,142 @@ class InputStream:
         numbers = {topic: n for n, topic in enumerate(topics)}
         numbers |= {topic: _BASE_TOPIC + n for n, topic in enumerate(self.base_topics)}
         self._numbers = numbers | {WRENCH: _WRENCH_TOPIC}
-        self._topics = {number: topic for topic, number in self._numbers.items()}
         world = None if source == BY_IMU else parameters.world_frame
+        inputs: Any = np.zeros(_WRENCH_TOPIC + 1, record('input_topic'))
         self._readers = {
             number: SampleReader(topic, world if number in range(_BASE_TOPIC, _WRENCH_TOPIC)
-                                 else parameters.base_frame, rejections)
-            for number, topic in self._topics.items()}
+                                 else parameters.base_frame, rejections, inputs[number:number + 1])
+            for topic, number in self._numbers.items()}
         widths: Integers = np.zeros(2 * _GROUP, np.int64)
         for number, reader in self._readers.items():
             if number != _WRENCH_TOPIC:
                 widths[number] = reader.width
         self._base_width = int(widths[_BASE_TOPIC:].sum())
         self._memory = np.zeros(function('input_stream_size')(), np.uint8)
+        self._inputs = inputs  # it must stay
         function('begin_stream')(
-            self._memory, widths, round(parameters.setpoint.sync_tolerance * SECOND),
+            self._memory, inputs, widths, round(parameters.setpoint.sync_tolerance * SECOND),
             round(parameters.setpoint.timeout * SECOND), round(parameters.base.timeout * SECOND),
             _SOURCES[source], np.array(parameters.gravity, dtype=float), _imu_of(parameters))
-        self._layouts: dict[int, MessageLayout] = {}
-        self._given: Any = np.zeros(1, record('given_sample'))
         self._events: Any = np.zeros(_EVENTS, record('input_event'))
-        progress: Any = np.zeros(1, record('join_progress'))
-        self._progress = progress.view(np.int64).data
-        self._n_events = progress.view(np.int64)[_N_EVENTS:_N_EVENTS + 1]
+        self._progress_record: Any = np.zeros(1, record('join_progress'))
+        self._progress = self._progress_record.view(np.int64).data
         self._last: tuple[Stamps, Array] = np.zeros(1, np.int64), np.zeros((1, BASE))
         self._last_base = function('last_base').bound(self._memory, *self._last)
-        self._ends = (self._given, _EVENTS, self._events, progress)
-        self._make_memory_of_one(_FEWEST_BYTES)
+        self._join = function('join_messages').bound(self._memory)
+        self._answer = function('answer_setpoints').bound(self._memory)
+        self._answers: tuple[Step, MessageRows, Callable[[dict[str, bytes]], object]] | None = None
+        self._reserve_memory(1, _FEWEST_BYTES)
 
-    def _make_memory_of_one(self, size: int) -> None:
-        """Make the memory of one message, which stays: a call takes a tenth of the time."""
-        data: Any = np.zeros(size, np.uint8)
-        whole: Integers = np.zeros(4, np.int64)  # topic, time, start and size of the message
-        self._data, self._message, self._room = data.data, whole.data, size
-        memory, self._join_one = self._bound(
-            1, whole[0:1], whole[1:2], data, whole[2:3], whole[3:4])
-        # A message completes nothing, a setpoint, or a sample of the base.
-        self._of_one = {each: _part(memory, *each) for each in ((0, 0), (1, 0), (0, 1))}
-
-    def _bound(self, count: int, topics: Integers, times: Stamps, data: Any, starts: Integers,
-               sizes: Integers) -> tuple[Joined, Callable[[], object]]:
-        """Return the memory for the numbers of messages, and the call that joins them."""
-        given, room, events, progress = self._ends
-        memory = Joined(
+    def _reserve_memory(self, count: int, size: int) -> None:
+        """Make the memory of messages, and of what they complete."""
+        self._room = count, size
+        self._data_bytes = np.empty(size, np.uint8)
+        self._data = self._data_bytes.data
+        self._places: Integers = np.zeros((4, count), np.int64)  # topics, times, starts, sizes
+        self._first_place = self._places.data  # as integers that are set fast
+        self._joined = Joined(
             np.empty(count, np.int64), np.empty((count, SETPOINT)), np.empty(count, np.int64),
             np.empty(count, np.int64), np.empty((count, BASE)),
             np.empty((count, self._base_width)), np.empty(count))
-        return memory, function('join_messages').bound(
-            self._memory, count, topics, times, data, starts, sizes, given, *memory, room, events,
-            progress)
+        self._parts = {each: _first_of(self._joined, *each) for each in ((0, 0), (1, 0), (0, 1))}
+        self._written: tuple[Any, ...] = (None, None, None)
+        if self._answers is not None:
+            rows = self._answers[1]
+            self._written = (np.empty((count, OUTPUT)), np.empty((count, rows.size), np.uint8),
+                             np.empty((count, len(rows.parts)), bool))
+        function('put_memory')(
+            self._memory, *self._places, self._data_bytes, *self._joined, *self._written, _EVENTS,
+            self._events, self._progress_record)
+
+    def answer_setpoints(self, step: Step, messages: OutputMessages,
+                         publish: Callable[[dict[str, bytes]], object]) -> None:
+        """
+        Answer setpoints from now on, in the call that completes them; the step's state is kept.
+
+        publish: called with the messages of each answer by topic, before ``join_messages`` ends.
+        """
+        self._answers = step, messages.rows, publish
+        function('put_answers')(self._memory, step.hexapod, *messages.rows.arguments)
+        self._reserve_memory(*self._room)
+
+    def hold_answers(self, held: bool) -> None:
+        """Complete setpoints without an answer, until ``answer_setpoint``."""
+        self._progress[_HELD] = held
+
+    def answer_setpoint(self, setpoint: Batch) -> None:
+        """Answer a single setpoint that was held."""
+        self._joined.stamps[:1], self._joined.rows[:1] = setpoint.stamps, setpoint.rows
+        self._progress[_N_SETPOINTS] = 1
+        self._answer()
+        self._publish_answers(1)
+
+    def _publish_answers(self, count: int) -> None:
+        """Publish the messages of the first setpoints in memory that are answered."""
+        assert self._answers is not None
+        _, rows, publish = self._answers
+        outputs, messages, having = self._written
+        for n in range(count):
+            if outputs[n, ANSWERED]:
+                data = messages[n].tobytes()
+                publish({topic: data[begin:end] for has, (topic, begin, end) in zip(
+                    having[n].tolist(), rows.parts, strict=True) if has})
+
+    def last_outputs(self) -> Outputs:
+        """Return the outputs of the last single setpoint; the stream keeps the step's state."""
+        assert self._answers is not None
+        return self._answers[0].outputs_of(
+            self._joined.stamps[:1].copy(), self._written[0][:1].copy(), FIRST)
 
     def join_message(self, topic: str, data: bytes, clock: Clock) -> Joined:
-        """Join one message; the result is valid until the next call."""
-        size = len(data)
-        if size > self._room:
-            self._make_memory_of_one(2 * size)
-        progress, message = self._progress, self._message
+        """Join one message; without arrays, which would take longer than all else."""
+        size, place = len(data), self._first_place
+        if size > self._room[1]:
+            self._reserve_memory(self._room[0], 2 * size)
+            place = self._first_place
+        place[0, 0], place[1, 0], place[2, 0], place[3, 0] = self._numbers[topic], 0, 0, size
         self._data[:size] = data
-        message[0], message[3] = self._numbers[topic], size
-        progress[_NEXT] = progress[_N_SETPOINTS] = progress[_N_BASES] = 0
-        progress[_TIMED] = 0
-        self._join_one()
-        while progress[_STATUS] != _DONE or progress[_N_EVENTS]:
-            self._report_events(None)
-            if progress[_STATUS] == _DONE:
-                break
-            if progress[_STATUS] == _CLOCK:
-                message[1], progress[_TIMED] = clock(), 1
-            elif progress[_STATUS] == _UNREAD:
-                self._read_fields(message[0], data)
-            self._join_one()
-        return self._of_one[progress[_N_SETPOINTS], progress[_N_BASES]]
+        return self._join_placed(1, clock)
 
     def join_messages(self, messages: Messages) -> Joined:
         """Join messages of these and other topics, in recorded order."""
-        topics = np.array([self._numbers.get(topic, -1) for topic in messages.topics], np.int64)[
-            messages.of_topic]
-        memory, join = self._bound(
-            len(topics), topics, np.ascontiguousarray(messages.times), messages.data,
-            np.ascontiguousarray(messages.starts), np.ascontiguousarray(messages.sizes))
+        count, size = len(messages.times), len(messages.data)
+        if count > self._room[0] or size > self._room[1]:
+            self._reserve_memory(max(count, self._room[0]), max(size, self._room[1]))
+        numbers = np.array([self._numbers.get(topic, -1) for topic in messages.topics])
+        self._places[:, :count] = (
+            numbers[messages.of_topic], messages.times, messages.starts, messages.sizes)
+        self._data_bytes[:size] = messages.data
+        return self._join_placed(count, None)
+
+    def _join_placed(self, count: int, clock: Clock | None) -> Joined:
+        """
+        Join the messages in memory.
+
+        clock: for stamps that are zero; None: these get the times of recording.
+        """
         progress = self._progress
+        progress[_COUNT], progress[_TIMED] = count, clock is None
         progress[_NEXT] = progress[_N_SETPOINTS] = progress[_N_BASES] = 0
-        progress[_TIMED], progress[_STATUS] = 1, -1
-        while progress[_STATUS] != _DONE:
-            join()
-            self._report_events(messages.times)
-            if progress[_STATUS] == _UNREAD:
-                n = progress[_NEXT]
-                self.recorded = int(messages.times[n])
-                start = messages.starts[n]
-                self._read_fields(
-                    int(topics[n]), messages.data[start:start + messages.sizes[n]].tobytes())
-        self.recorded = None
-        return _part(memory, progress[_N_SETPOINTS], progress[_N_BASES])
+        self._join()
+        while progress[_STATUS] != _DONE or progress[_N_EVENTS]:
+            self._report_events(clock is None)
+            if progress[_STATUS] == _DONE:
+                break
+            if progress[_STATUS] == _CLOCK and clock is not None:
+                self._places[1, :count], progress[_TIMED] = clock(), 1
+            self._join()
+        n, k = progress[_N_SETPOINTS], progress[_N_BASES]
+        if n and self._answers is not None and not progress[_HELD]:
+            self._publish_answers(n)
+        return self._parts.get((n, k)) or _first_of(self._joined, n, k)
 
-    def _read_fields(self, number: int, data: bytes) -> None:
-        """Read a message field by field, as the next sample."""
-        reader, given = self._readers[number], self._given
-        sample = reader.read_fields(data)
-        if sample is None:
-            given['state'] = _REJECTED
-            return
-        stamp, values = sample
-        given['state'], given['stamp'] = _VALID, stamp
-        given['values'][0, :len(values)] = values
-        if (layout := reader.new_layout()) is not None:
-            self._layouts[number] = layout  # its arrays must stay
-            function('put_layout')(self._memory, number, *layout)
-
-    def _report_events(self, times: Stamps | None, why: str = '') -> None:
-        """Report what C has noted; times: when the messages were recorded [ns]."""
+    def _report_events(self, recorded: bool, why: str = '') -> None:
+        """Report what C has noted; whether the times of messages are those of recording."""
         for kind, number, stamp, last, n in self._events[:self._progress[_N_EVENTS]].tolist():
-            self.recorded = int(times[n]) if times is not None and n >= 0 else None
-            topic = self._topics[number]
+            self.recorded = int(self._places[1, n]) if recorded and n >= 0 else None
+            reader = self._readers[number]
+            topic = reader.topic
             if kind == _TWICE:
                 self._reject(topic, TWICE, stamp_words(stamp))
             elif kind == _TOO_OLD:
@@ -204,11 +228,14 @@ class InputStream:
             elif kind in (_ENDED, _BEFORE_RESTART):
                 reason = why if kind == _ENDED else 'before setpoints restarted'
                 self._reject(topic, NOT_JOINED, f'{stamp_words(stamp)}: {reason}')
-            else:
+            elif kind in (_RESTART, _NOTICE_UNSTAMPED):
                 text = jumped_back(last - stamp) if kind == _RESTART else (
                     f'{topic}: header stamps are zero: such samples are joined in order of '
                     'arrival and stamped with the clock')
                 self._noticed(f'base: {text}' if number >= _BASE_TOPIC else text)
+            else:
+                start, size = self._places[2:, n].tolist()
+                reader.reject_message(kind, bytes(self._data[start:start + size]))
         self._progress[_N_EVENTS] = 0
         self.recorded = None
 
@@ -220,8 +247,8 @@ class InputStream:
             restart.
         """
         for group in (_SETPOINTS, _BASE):
-            function('end_stream')(self._memory, group, restart, self._events, self._n_events)
-            self._report_events(None, why)
+            function('end_stream')(self._memory, group, restart)
+            self._report_events(False, why)
 
     def base_at(self, stamp: int) -> tuple[float, ...]:
         """Return the row (BASE,) of the base at a stamp [ns], nan if unknown."""
@@ -243,7 +270,7 @@ class InputStream:
         return fx, fy, fz, tx, ty, tz
 
 
-def _part(memory: Joined, n: int, k: int) -> Joined:
+def _first_of(memory: Joined, n: int, k: int) -> Joined:
     """Return the first n setpoints and k samples of the base."""
     return Joined(memory.stamps[:n], memory.rows[:n], memory.places[:n], memory.base_stamps[:k],
                   memory.base_rows[:k], memory.base_values[:k], memory.base_restarts[:k])

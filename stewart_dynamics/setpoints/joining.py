@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Six
+from stewart_dynamics.arrays import Array, Six, Stamps
 from stewart_dynamics.mechanics.kinematics.pose_mistakes import (
     IN_DEGREES, pose_mistake, PoseByAngles)
 from stewart_dynamics.messages.recorded import Messages
@@ -25,9 +25,10 @@ from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, Mistake
 from stewart_dynamics.setpoints.inconsistency import QUANTITIES, RATES
 from stewart_dynamics.setpoints.input_messages import ACCEL, COMBINED, SOURCES, TWIST
-from stewart_dynamics.setpoints.input_stream import Clock, InputStream
+from stewart_dynamics.setpoints.input_stream import Clock, InputStream, Joined
+from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import Rejection, Rejections
-from stewart_dynamics.setpoints.step import Batch, SETPOINT
+from stewart_dynamics.setpoints.step import Batch, Outputs, SETPOINT, Step
 
 
 class Setpoints:
@@ -118,27 +119,42 @@ class Setpoints:
 
     def join_message(self, topic: str, data: bytes, clock: Clock) -> Batch:
         """Return the setpoint that a message completes, if any; ``judge`` checks it."""
-        joined = self._stream.join_message(topic, data, clock)
+        return self._note_joined(self._stream.join_message(topic, data, clock), None)
+
+    def join_messages(self, messages: Messages) -> Batch:
+        """Return the setpoints that recorded messages complete."""
+        setpoints = self._note_joined(self._stream.join_messages(messages), messages.times)
+        self._note_setpoints()
+        return setpoints
+
+    def _note_joined(self, joined: Joined, times: Stamps | None) -> Batch:
+        """Note what is joined for the checks; return the setpoints."""
         if len(joined.base_stamps):
             self.base.note(joined)
         if not len(joined.stamps):
             return self._none
         stamps = joined.stamps.copy()
-        setpoint = Batch(stamps, joined.rows.copy(), stamps, self._none.moving)
-        self._unchecked.append(setpoint)
-        return setpoint
-
-    def join_messages(self, messages: Messages) -> Batch:
-        """Return the setpoints that recorded messages complete."""
-        joined = self._stream.join_messages(messages)
-        self.base.note(joined)
-        if not len(joined.stamps):
-            return self._none
-        setpoints = Batch(
-            joined.stamps, joined.rows, messages.times[joined.places], self._none.moving)
+        setpoints = Batch(stamps, joined.rows.copy(), stamps if times is None else times[
+            joined.places], self._none.moving)
         self._unchecked.append(setpoints)
-        self._note_setpoints()
         return setpoints
+
+    def answer_setpoints(self, step: Step, messages: OutputMessages,
+                         publish: Callable[[dict[str, bytes]], object]) -> None:
+        """Answer setpoints from now on, see ``InputStream``."""
+        self._stream.answer_setpoints(step, messages, publish)
+
+    def hold_answers(self, held: bool) -> None:
+        """Complete setpoints without an answer, until ``answer_setpoint``."""
+        self._stream.hold_answers(held)
+
+    def answer_setpoint(self, setpoint: Batch) -> None:
+        """Answer a single setpoint that was held."""
+        self._stream.answer_setpoint(setpoint)
+
+    def last_outputs(self) -> Outputs:
+        """Return the outputs of the last single setpoint; the stream keeps the step's state."""
+        return self._stream.last_outputs()
 
     def _note_setpoints(self) -> None:
         """Note setpoints for the checks: after they are answered."""

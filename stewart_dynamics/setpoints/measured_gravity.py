@@ -79,16 +79,17 @@ class MeasuredGravity:
         self.found: dict[str, tuple[str, int]] = {}
         """The first of each kind."""
 
-    def add(self, stamp: int, row: Sequence[float]) -> None:
-        """Add a sample: stamp [ns], row (BASE,)."""
-        if self._stamps and not 0 <= stamp - self._stamps[0] < _WINDOW:
-            if _WINDOW <= stamp - self._stamps[0] < 2 * _WINDOW and len(self._stamps) >= _FEWEST:
-                self._add_window(np.array(self._stamps), np.array(self._rows))
-            else:
-                self._windows.clear()
-            self._stamps, self._rows = [], []
-        self._stamps.append(stamp)
-        self._rows.append(row)
+    def add_samples(self, stamps: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
+        """Add samples: stamps (N,) [ns], rows (N, BASE)."""
+        for stamp, row in zip(stamps, rows, strict=True):
+            if self._stamps and not 0 <= (passed := stamp - self._stamps[0]) < _WINDOW:
+                if _WINDOW <= passed < 2 * _WINDOW and len(self._stamps) >= _FEWEST:
+                    self._add_window(np.array(self._stamps), np.array(self._rows))
+                else:
+                    self._windows.clear()
+                self._stamps, self._rows = [], []
+            self._stamps.append(stamp)
+            self._rows.append(row)
 
     def _add_window(self, stamps: Stamps, rows: Array) -> None:
         with np.errstate(all='ignore'):

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics import rows
-from stewart_dynamics.mechanics.drives.servos import pulse_rows, with_servos
+from stewart_dynamics.mechanics.drives.servos import with_servos
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import JointStateWriter
-from stewart_dynamics.messages.layout import SideBySide, Written
+from stewart_dynamics.messages.layout import MessageRows, Written
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.messages.standard import BOOLEAN, FLOAT64, FLOAT64_ARRAY
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base_wrench_step import BASE_WRENCH
 from stewart_dynamics.setpoints.step import (
     CHANGED, FINITE_MOTORS, MOTOR_ANGLES, MOTOR_COMMANDS, MOTOR_SPEEDS, OUTPUT, Outputs, POSITIONS,
-    Step, WARNING_STATE)
+    WARNING_STATE)
 
 LEG_STATES, DETERMINANT, WARNING = (
     'leg_states', 'jacobian_determinant', 'singularity_warning')
@@ -98,11 +98,13 @@ class OutputMessages:
                 Written(MOTOR_TORQUES, FLOAT64_ARRAY, [MOTOR_COMMANDS], known=torque,
                         positive=FINITE_MOTORS)]
             self.types |= MOTOR_TYPES
-        self._of_outputs = SideBySide(kinds, OUTPUT)
-        self._pulses: _ServoPulses | None = None
-        if with_servos(parameters):
-            self._pulses = _ServoPulses(parameters)
+        servos = None
+        if with_servos(parameters):  # an angle outside the points of its servo has no pulse
+            servos = parameters.structure
+            kinds.append(Written(SERVO_PULSES, FLOAT64_ARRAY, [slice(OUTPUT, OUTPUT + 6)],
+                                 known=OUTPUT))
             self.types |= SERVO_TYPES
+        self.rows = MessageRows(kinds, OUTPUT, servos)
         self._wrench = StampedWriter(parameters.base_frame, 6)
 
     def of(self, outputs: Outputs) -> list[tuple[str, Flags, NDArray[np.void]]]:
@@ -111,16 +113,7 @@ class OutputMessages:
 
         Returns topics, which outputs have a message (N,), and the messages (N,), of one length.
         """
-        messages = self._of_outputs.write(outputs.stamps, outputs.rows)
-        return messages if self._pulses is None else messages + self._pulses.of(outputs)
-
-    def bound_to(self, step: Step) -> Callable[[], dict[str, bytes]]:
-        """Return a function that returns the messages of the last single setpoint of a step."""
-        write = self._of_outputs.bound(*step.last_one)
-        if self._pulses is None:
-            return write
-        write_pulses = self._pulses.bound_to(step)
-        return lambda: write() | write_pulses()
+        return self.rows.write(outputs.stamps, outputs.rows)
 
     def of_wrench(self, stamp: int, wrench: Sequence[float]) -> bytes:
         """Return the geometry_msgs/WrenchStamped of a wrench in base axes."""
@@ -131,40 +124,6 @@ class OutputMessages:
         """Return messages for stamps (N,) [ns] and wrenches (N, 6); none for rows of nan."""
         messages = self._wrench.layout.write(stamps, base_wrenches)
         return BASE_WRENCH, ~np.isnan(base_wrenches[:, 0]), messages
-
-
-class _ServoPulses:
-    """
-    Writes the pulse widths of servos, for outputs whose efforts are published.
-
-    A pulse is a command, suppressed together with the efforts. Outputs with an angle outside the
-    points of its servo have no message.
-    """
-
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters, self._kind = parameters, parameters.leg_kind
-        self._writer = SideBySide(
-            [Written(SERVO_PULSES, FLOAT64_ARRAY, [slice(0, 6)], known=0)], 6)
-
-    def of(self, outputs: Outputs) -> list[tuple[str, Flags, NDArray[np.void]]]:
-        """Return the messages, as those of OutputMessages."""
-        pulses, _ = pulse_rows(self._parameters, outputs.drive_positions)
-        pulses[~outputs.with_efforts] = np.nan
-        return self._writer.write(outputs.stamps, pulses)
-
-    def bound_to(self, step: Step) -> Callable[[], dict[str, bytes]]:
-        """Return the same as ``OutputMessages.bound_to``."""
-        stamp, row = step.last_one
-        positions, effort = self._kind.position.columns, self._kind.published.start
-        pulses = np.empty((1, 6))
-        write = self._writer.bound(stamp, pulses)
-
-        def written() -> dict[str, bytes]:
-            pulses[:] = (np.nan if np.isnan(row[0, effort])
-                         else pulse_rows(self._parameters, row[:, positions])[0])
-            return write()
-
-        return written
 
 
 def motor_states_writer(parameters: Parameters) -> JointStateWriter | None:

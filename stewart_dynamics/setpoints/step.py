@@ -41,7 +41,7 @@ SETPOINT = 1 + _STAMPED
      'clearances', 'motors', 'rises'))
 MOTOR_ANGLES, MOTOR_SPEEDS, MOTOR_COMMANDS = (
     _OUTPUT[f'motors.{name}'] for name in ('angles', 'speeds', 'commands'))
-_ANSWERED, _RESTARTED, CHANGED, EXCEEDING, _JUMPED, FINITE_MOTORS = (_OUTPUT[name] for name in (
+ANSWERED, _RESTARTED, CHANGED, EXCEEDING, _JUMPED, FINITE_MOTORS = (_OUTPUT[name] for name in (
     'answered', 'restart', 'changed', 'exceeding', 'jumped', 'finite_motors'))
 WARNING_STATE = slice(_OUTPUT['warning'], 1 + _OUTPUT['crossings'])
 _JOINT_ANGLES = slice(_BASE_JOINT_ANGLES.start, _PLATFORM_JOINT_ANGLES.stop)
@@ -55,9 +55,6 @@ The state before the first setpoint: the bits of the structure ``stewart_state``
 copied far faster than a record.
 """
 FIRST.flags.writeable = False
-# The mask of a single answered setpoint: making it took as long as the computation.
-_THE_ONE: Flags = np.ones(1, dtype=bool)
-_THE_ONE.flags.writeable = False
 
 
 class Batch(NamedTuple):
@@ -327,24 +324,18 @@ class Step:
     """
     The step for a hexapod with given parameters.
 
-    parameters: constant for all calls; create another step for other parameters. Not thread-safe:
-        calls for a batch of one share memory.
+    parameters: constant for all calls; create another step for other parameters.
     """
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
-        hexapod = limited_structure(parameters)
-        self._hexapod, self._bounds = hexapod, limit_bounds(parameters)
+        self.hexapod = hexapod = limited_structure(parameters)
+        """The structure ``stewart_platform`` in C."""
+        self._bounds = limit_bounds(parameters)
         self._computed = Computed.of(
             parameters, *(bool(hexapod[f'with_{each}']) for each in (
                 'joint_angles', 'clearance', 'motors')))
         self._step = function('step_setpoints').bound(hexapod)
-        # A single setpoint is copied to memory that stays: half the time of a call with any.
-        self._memory: tuple[Any, ...] = (
-            np.zeros(1, np.int64), np.zeros((1, SETPOINT)), FIRST.copy(), np.empty((1, OUTPUT)))
-        self._step_one = function('step_setpoints').bound(hexapod, 0, 1, *self._memory)
-        self.last_one: tuple[Stamps, Array] = self._memory[0], self._memory[-1]
-        """Memory that has stamp (1,) and row (1, OUTPUT) of the last call for a single one."""
 
     def __call__(self, setpoints: Batch, before: Array = FIRST) -> Outputs:
         """
@@ -353,26 +344,21 @@ class Step:
         setpoints: finite, with valid rotation matrices.
         before: state of the previous outputs.
         """
-        stamps, given, number = setpoints.stamps, setpoints.rows, len(setpoints.stamps)
-        if number == 1:
-            at, of_one, last, found = self._memory
-            at[:], of_one[:], last[:] = stamps, given, before
-            n_answered = self._step_one()
-            state, rows = last.copy(), found.copy()
-        else:
-            rows, state = np.empty((number, OUTPUT)), before.copy()
-            in_parts(self._solve, (), given, rows)
-            n_answered = self._step(1, number, stamps, given, state, rows)
-        if n_answered == number == 1:
-            answered = _THE_ONE
-        else:
-            answered = rows[:, _ANSWERED] > 0.0
-        if n_answered < number:
+        number = len(setpoints.stamps)
+        rows, state = np.empty((number, OUTPUT)), before.copy()
+        in_parts(self._solve, (), setpoints.rows, rows)
+        self._step(1, number, setpoints.stamps, setpoints.rows, state, rows)
+        return self.outputs_of(setpoints.stamps, rows, state)
+
+    def outputs_of(self, stamps: Stamps, rows: Array, state: Array) -> Outputs:
+        """Return the outputs of setpoints from all of their rows (N, OUTPUT)."""
+        answered = rows[:, ANSWERED] > 0.0
+        if not answered.all():
             stamps, rows = stamps[answered], rows[answered]
         return Outputs(answered, stamps, rows, self._computed, state)
 
     def _solve(self, setpoints: Array, outputs: Array) -> None:
-        function('solve_setpoints')(self._hexapod, len(setpoints), setpoints, outputs)
+        function('solve_setpoints')(self.hexapod, len(setpoints), setpoints, outputs)
 
     def exceedances(self, outputs: Outputs, n: int = 0) -> tuple[Exceedance, ...]:
         """Return the limits that the motion or the motors of a setpoint exceed."""

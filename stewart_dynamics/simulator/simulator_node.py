@@ -23,7 +23,7 @@ from std_msgs.msg import Float64MultiArray
 from stewart_dynamics.arrays import SECOND, Six
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.messages import type_names
-from stewart_dynamics.messages.cdr import finite, MalformedError
+from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
 from stewart_dynamics.ros.declared_parameters import declare_parameters, MADE_WITH
 from stewart_dynamics.ros.due_periods import DuePeriods
@@ -157,7 +157,7 @@ class SimulatorNode(Node):
         if len(values) != 6:
             self._rejections.reject('commands', NOT_SIX, f'{len(values)} numbers')
             return
-        if not finite(values):
+        if not all(map(math.isfinite, values)):
             self._rejections.reject('commands', NOT_FINITE, str(values))
             return
         first, second, third, fourth, fifth, sixth = values
