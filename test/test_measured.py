@@ -435,6 +435,18 @@ def test_setpoints_without_computed_forces_are_not_compared() -> None:
         'without_measurement': 0, 'without_force': 4}
 
 
+@pytest.mark.parametrize('effort', [-1e200, 9e99])
+def test_efforts_whose_squares_overflow_give_no_number_that_is_not_finite(effort: float) -> None:
+    case = case_of()
+    case.outputs.demanded_efforts[7:11] = effort
+    comparison = Comparison(case.parameters)
+    seconds, *_ = compared(comparison, case, (case.setpoints.stamps, np.ones((500, 6))))
+    too_large = 4 * (effort < -1e100)
+    assert comparison.too_large == too_large == 500 - len(seconds)
+    values = json.loads(to_json(comparison.values()))
+    assert values['setpoints_not_compared']['without_force'] == too_large
+
+
 def test_nothing_compared_gives_null() -> None:
     case = case_of(many=3)
     comparison = Comparison(case.parameters)

@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics.drives.servos import outside_servos, pulse_rows,
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.messages.joint_state import JointStateReader
+from stewart_dynamics.messages.joint_state import JointStateReader, NUMBERS_END
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.program import SOFTWARE
@@ -245,6 +245,10 @@ class _Run:
         if self._comparison is not None:
             self._efforts.check()
             self._compared(self._comparison.finish())
+            if self._comparison.too_large:
+                self._notice(
+                    f'{self._comparison.too_large} of the setpoints have computed efforts of '
+                    f'{NUMBERS_END:g} or more: they are not compared with measured ones')
         if self._response is not None:
             try:
                 self.followed = self._response.finish()

@@ -117,6 +117,8 @@ class Comparison:
         self._setpoints = Waiting(self._gap, _SETPOINTS_WAITING)
         self._samples = Waiting(self._gap, _SAMPLES_WAITING)
         self._without_force = 0
+        self.too_large = 0
+        """Setpoints that are not compared: computed efforts of NUMBERS_END or more."""
         self._legs = _Statistics()
         self._sums = EffortSums(parameters, of_motors)
         self._wrench = _Statistics()
@@ -159,8 +161,11 @@ class Comparison:
                 setpoints.stamps[mine], samples.stamps[same], samples.rows[same], self._gap)
         self._samples.forget_before(*self._setpoints.oldest())
         there = np.isfinite(measured[:, 0])
-        known = there & np.isfinite(rows[:, _FORCES]).all(axis=1)
+        # also without nan; squares of larger ones overflow, as those of measured efforts would
+        known = there & (np.abs(rows[:, _FORCES]) < NUMBERS_END).all(axis=1)
         self._without_force += int(np.count_nonzero(there & ~known))
+        self.too_large += int(np.count_nonzero(
+            there & (np.abs(rows[:, _FORCES]) >= NUMBERS_END).any(axis=1)))
         if not known.all():
             rows, measured = rows[known], measured[known]
         if self._losses:
@@ -226,7 +231,7 @@ class Comparison:
         spread = ((squares * number - total ** 2)
                   * (measured_squares * number - measured_total ** 2))
         # the correlation of constant forces is rounding error
-        constant = not spread > 1e-20 * squares * measured_squares * number ** 2
+        constant = not 1e-20 * squares * measured_squares * number ** 2 < spread < np.inf
         correlation = None if constant else np.clip(
             (products * number - total * measured_total) / np.sqrt(spread), -1.0, 1.0)
         return {**named, key_of('measured_rms', self._unit): rms[0],
