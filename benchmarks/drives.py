@@ -61,7 +61,7 @@ def measure() -> list[str]:
         outputs = step(later, before.state)
         assert outputs.answered[0]
         times = (least(lambda: step(later, before.state)),  # noqa: B023
-                 least(lambda: list(messages.of(outputs))))  # noqa: B023
+                 least(lambda: list(messages.write_outputs(outputs))))  # noqa: B023
         first = first if changes else times
         cells.append((name, *(f'{time:.2f}' for time in times), *(
             f'{time - of_legs:.2f}' if changes else '' for time, of_legs in zip(

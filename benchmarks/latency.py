@@ -40,7 +40,7 @@ from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.layout import Layout
-from stewart_dynamics.messages.setpoint import combined, layout_of, pose, twist
+from stewart_dynamics.messages.setpoint import layout_of
 from stewart_dynamics.reference_motion.motion_functions import motion_at
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from trajectory_msgs.msg import (
@@ -70,20 +70,21 @@ def messages(source: str) -> list[tuple[bytes, ...]]:
     numbers = (np.column_stack([motion.position, to_quaternion(motion.rotation)]),
                np.column_stack([motion.linear_velocity, motion.angular_velocity]),
                np.column_stack([motion.linear_acceleration, motion.angular_acceleration]))
+    stamps = np.zeros(REPEATED, dtype=np.int64)
     if source == 'combined':
         empty = MultiDOFJointTrajectory(
             joint_names=['platform'], points=[MultiDOFJointTrajectoryPoint(
                 transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()])])
-        written = [_layout(combined, empty).write(None, *numbers)]
+        written = [_layout(empty).write(stamps, *numbers)]
     else:
-        written = [_layout(pose, PoseStamped()).write(None, numbers[0]),
-                   _layout(twist, TwistStamped()).write(None, numbers[1]),
-                   _layout(twist, AccelStamped()).write(None, numbers[2])]
+        written = [_layout(kind()).write(stamps, values) for kind, values in zip(
+            (PoseStamped, TwistStamped, AccelStamped), numbers, strict=True)]
     return [tuple(each.tobytes() for each in together) for together in zip(*written, strict=True)]
 
 
-def _layout(reader: Any, message: Any) -> Layout:
-    return layout_of(reader, bytes(serialize_message(message)))
+def _layout(message: Any) -> Layout:
+    package = type(message).__module__.partition('.')[0]
+    return layout_of(f'{package}/msg/{type(message).__name__}', bytes(serialize_message(message)))
 
 
 def publish(path: Path, turns: Sequence[str]) -> None:

@@ -413,11 +413,11 @@ def measurement_words() -> str:
     def follow() -> None:
         measured = MeasuredLegs(parameters, step, lambda *said: None, lambda said: None)
         for message in messages:
-            estimate = measured.take(message, NO_WRENCH, None)
+            estimate = measured.use_message(message, NO_WRENCH, None)
             if estimate is None:
                 raise SystemExit('a measurement was rejected')
             if estimate.wrench is not None:
-                written.of_wrench(estimate.stamp, estimate.wrench)
+                written.write_wrench(estimate.stamp, estimate.wrench)
 
     times = repeat(follow, timer=time.process_time, repeat=21, number=1)
     return (f'A measurement takes {median(times) / len(messages) * 1e6:.1f} us of processor time, '

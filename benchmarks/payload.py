@@ -78,7 +78,7 @@ def measured(noise: tuple[float, float, float]) -> Callable[[int], LegHistory]:
                 coloured * np.sqrt(1.0 - memory ** 2) * random.normal(size=forces.shape),
                 strict=True):
             slow = memory * slow + new
-            history.add(tuple((force + white + slow).tolist()),
+            history.add_measurement(tuple((force + white + slow).tolist()),
                         Estimate(stamp, tuple(row), None, None), NO_WRENCH)
         return history
 

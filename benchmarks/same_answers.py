@@ -215,8 +215,9 @@ def joined(given: dict[str, Any], found: list[tuple[str, int, bytes]], cuts: lis
             batches.append(take(topic, data, lambda at=at: at))
             setpoints.judge()
     else:
-        whole = Messages.of(TOPICS, [TOPICS.index(each[0]) for each in found],
-                            [each[1] for each in found], [each[2] for each in found])
+        from_bytes: Any = getattr(Messages, 'from_bytes', None) or getattr(Messages, 'of')  # noqa: B009
+        whole = from_bytes(TOPICS, [TOPICS.index(each[0]) for each in found],
+                           [each[1] for each in found], [each[2] for each in found])
         take = getattr(setpoints, 'join_messages', None) or setpoints.take
         for first, end in pairwise([0, *cuts, len(found)]):
             batches.append(take(whole.chosen(slice(first, end))))

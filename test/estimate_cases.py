@@ -486,7 +486,7 @@ def history_of(given: Recorded, motion: Motion, p: Parameters = GIVEN) -> LegHis
                       platform.twist(poses, given.rates)])
     history = LegHistory(p['payload.window'])
     for time, row, forces in zip(given.times, rows.tolist(), given.efforts.tolist(), strict=True):
-        history.add(tuple(forces), Estimate(
+        history.add_measurement(tuple(forces), Estimate(
             round((2.0 + time) * 1e9), tuple(row), None, None, NO_BASE), NO_WRENCH)
     return history
 

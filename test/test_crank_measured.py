@@ -147,7 +147,7 @@ def test_a_payload_is_identified_from_angles_and_torques() -> None:
     torques = torques + 0.5 * random.normal(size=torques.shape)
     history = LegHistory(RIG['payload.window'])
     for time, row, efforts in zip(times, motion.rows, torques, strict=True):
-        history.add(six(efforts), Estimate(
+        history.add_measurement(six(efforts), Estimate(
             BEGIN + round(1e9 * time), six(row), None, None, NO_BASE), NO_LOAD)
     *pieces, last = identify(history, PLATFORM)
     assert not any(pieces) and last is not None and last.payload is not None, last
@@ -167,7 +167,7 @@ def test_saturated_torques_and_cranks_at_their_ends_are_not_used(saturated: bool
     if saturated:
         torques = np.clip(torques, -60.0, 60.0)
     for time, row, efforts in zip(times, swaying(times).rows, torques, strict=True):
-        history.add(six(efforts), Estimate(
+        history.add_measurement(six(efforts), Estimate(
             BEGIN + round(1e9 * time), six(row), None, None, NO_BASE), NO_LOAD)
     *_, last = identify(history, StewartPlatform(RIG.replaced(limits)))
     assert last is not None
@@ -232,7 +232,7 @@ def test_measured_torques_and_currents_of_motors_are_taken(file: Path, efforts: 
     states, found = JointStateWriter(p.joints), None
     positions, rates = (getattr(at, each.field) for each in (kind.position, kind.rate))
     for n, time in enumerate(times):
-        found = follow.take(states.write(
+        found = follow.use_message(states.write(
             BEGIN + round(1e9 * time), positions[n] - p.geometry.zero_length, rates[n], given[n],
             ), NO_LOAD, None)
     assert found is not None and found.wrench is not None and not rejected

@@ -449,7 +449,7 @@ def test_the_payload_on_cranks_is_identified_by_a_service(start: Start) -> None:
         seconds, moved.angles, moved.speeds, acting.torques, strict=True)]
     parameters, history = PLATFORM.parameters.replaced({'setpoint.timeout': 60.0}), LegHistory(10)
     follow = MeasuredLegs(parameters, ExternalWrench(parameters), print, print, history)
-    assert all(follow.take(each, NO_WRENCH, None) for each in states)
+    assert all(follow.use_message(each, NO_WRENCH, None) for each in states)
     *_, expected = identify(history, StewartPlatform(parameters))
     assert expected is not None and expected.payload is not None
     assert expected.payload.fitted.body.mass == pytest.approx(

@@ -72,7 +72,7 @@ def pieces(batch: Batch, cuts: Any) -> Iterator[Batch]:
 
 def differentiated(differentiator: Differentiator, batches: Any) -> Batch:
     """Return all that comes out of it."""
-    done = [differentiator.add(batch) for batch in batches]
+    done = [differentiator.add_setpoints(batch) for batch in batches]
     done.append(differentiator.finish())
     # nothing is done yet, or something with a row of the base for each
     some = [each for each in done if len(each.stamps)] or done[-1:]

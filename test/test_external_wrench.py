@@ -467,7 +467,7 @@ def judged(measurements: Sequence[Measurement], parameters: Parameters = HEXAPOD
         pytest.fail(f'{said}')
 
     legs = MeasuredLegs(parameters, ExternalWrench(parameters), failed, failed)
-    found = [legs.take(message_of(each), NO_WRENCH, None) for each in measurements]
+    found = [legs.use_message(message_of(each), NO_WRENCH, None) for each in measurements]
     return [each for each in found if each is not None]
 
 
@@ -596,11 +596,11 @@ def test_a_changed_mass_is_judged_anew() -> None:
     legs = MeasuredLegs(HEXAPOD, ExternalWrench(HEXAPOD), print, print)
     *first, last = [message_of(each) for each in stream(100.0, True, parameters=heavy)]
     for message in first:
-        found = legs.take(message, NO_WRENCH, None)
+        found = legs.use_message(message, NO_WRENCH, None)
     assert found is not None and found.mistake is not None
     assert found.mistake.what == 'scale' and found.published is not None
     legs.use(heavy, ExternalWrench(heavy))
-    found = legs.take(last, NO_WRENCH, None)
+    found = legs.use_message(last, NO_WRENCH, None)
     assert found is not None and found.mistake is None
 
 
@@ -642,7 +642,7 @@ class Followed:
             self.noticed.append)
 
     def take(self, data: bytes) -> Estimate | None:
-        return self._legs.take(data, NO_WRENCH, TARGET, self.base)
+        return self._legs.use_message(data, NO_WRENCH, TARGET, self.base)
 
     def rejects(self, data: bytes, reason: str, details: str) -> None:
         """Check that a message is rejected, for which reason and with which details."""
@@ -663,7 +663,7 @@ EXPECTED = estimates(ExternalWrench(HEXAPOD), [
 
 def test_messages_give_what_the_step_gives_for_their_numbers() -> None:
     followed = Followed()
-    assert [followed.take(message_of(each)) for each in REST] == EXPECTED
+    assert [followed.use_message(message_of(each)) for each in REST] == EXPECTED
     assert not followed.rejected
     assert not followed.noticed
 
@@ -675,7 +675,7 @@ def test_measured_legs_are_rejected_until_the_base_is_known() -> None:
     followed.base = base
     followed.rejects(message_of(REST[0]), BASE_NOT_KNOWN, f'stamp {BEGIN} ns')
     base.join_message(BASE_IMU, imu(BEGIN, force=(0.0, 0.0, 9.80665)), lambda: 0)
-    found = [followed.take(message_of(each)) for each in REST]
+    found = [followed.use_message(message_of(each)) for each in REST]
     assert len(followed.rejected) == 1
     last = found[-1]
     assert last is not None
@@ -687,7 +687,7 @@ def test_padding_bytes_are_ignored() -> None:
     followed = Followed()
     for at, filling in zip(REST[:8], (b'', b'\0', b'\0', b'\xff\xff\xff', b'', b'\1', b'\2', b''),
                            strict=True):
-        assert followed.take(message_of(at, frame='abc') + filling) is not None
+        assert followed.use_message(message_of(at, frame='abc') + filling) is not None
     assert not followed.rejected
 
 
@@ -722,9 +722,9 @@ def changed(**fields: Any) -> Callable[[Measurement], bytes]:
 def test_a_rejected_message_changes_nothing(
         make: Callable[[Measurement], bytes], reason: str, details: str) -> None:
     followed = Followed()
-    assert followed.take(message_of(REST[0])) == EXPECTED[0]
+    assert followed.use_message(message_of(REST[0])) == EXPECTED[0]
     followed.rejects(make(REST[1]), reason, details)
-    assert followed.take(message_of(REST[2])) == estimates(
+    assert followed.use_message(message_of(REST[2])) == estimates(
         ExternalWrench(HEXAPOD), [REST[0], REST[2]])[1]
     assert len(followed.rejected) == 1
 
@@ -744,7 +744,7 @@ def test_for_any_input_a_wrench_is_finite(noise: bytes, at: int, byte: int) -> N
     sound = message_of(REST[0])
     for data in (noise, sound[:at] + noise, sound[:at] + bytes([byte]) + sound[at + 1:],
                  message_of(REST[1]), message_of(REST[2])):
-        found = followed.take(data)
+        found = followed.use_message(data)
         if found is not None and found.wrench is not None:
             assert np.all(np.isfinite(found.wrench))
 
@@ -755,8 +755,8 @@ def test_a_jump_back_is_a_restart() -> None:
     followed = Followed()
     late = 10 ** 12
     for at in REST[:3]:
-        assert followed.take(message_of(at._replace(stamp=at.stamp + late))) is not None
-    assert [followed.take(message_of(each)) for each in REST] == EXPECTED
+        assert followed.use_message(message_of(at._replace(stamp=at.stamp + late))) is not None
+    assert [followed.use_message(message_of(each)) for each in REST] == EXPECTED
     assert followed.noticed == [
         'measured_legs: stamps jumped back by 1000 s: followed as a restart']
     assert not followed.rejected
@@ -765,12 +765,12 @@ def test_a_jump_back_is_a_restart() -> None:
 def test_the_setpoint_is_the_guess_after_a_long_search() -> None:
     """Such a hexapod was moved meanwhile; until then only the last pose is believed."""
     followed = Followed()
-    assert followed.take(message_of(REST[0])) is not None
+    assert followed.use_message(message_of(REST[0])) is not None
     away = StewartPlatform(HEXAPOD).inverse_dynamics(swing(0.9))
     for n in range(1, 4):
         followed.rejects(changed(position=[5.0, 0.3, 0.3, 0.3, 0.3, 0.3])(
             REST[0]._replace(stamp=BEGIN + n * 30 * MILLISECOND)), NOT_CONVERGED, ' iterations')
-    found = followed.take(changed(position=away.lengths - ZERO_LENGTHS)(
+    found = followed.use_message(changed(position=away.lengths - ZERO_LENGTHS)(
         REST[0]._replace(stamp=BEGIN + 120 * MILLISECOND)))
     assert found is not None
     assert found.wrench is None

@@ -133,7 +133,7 @@ def taken(messages: list[bytes], parameters: Parameters = HEXAPOD,
         pytest.fail(f'{said}')
 
     legs = MeasuredLegs(parameters, ExternalWrench(parameters), failed, failed, history)
-    found = [legs.take(each, NO_WRENCH, None) for each in messages]
+    found = [legs.use_message(each, NO_WRENCH, None) for each in messages]
     return [each for each in found if each is not None]
 
 
@@ -147,7 +147,7 @@ def test_published_wrenches_have_the_librarys_bits(begin: Callable[..., Felt]) -
                                    six(each.rates + 1e-4 * random.normal(size=6)),
                                    six(each.efforts + 5.0 * random.normal(size=6))))
             for each in measured(HEXAPOD, motion, LOAD, stamps)]
-    expected = [OutputMessages(HEXAPOD).of_wrench(each.stamp, each.wrench)
+    expected = [OutputMessages(HEXAPOD).write_wrench(each.stamp, each.wrench)
                 for each in taken(data) if each.wrench is not None]
     for message in data:
         felt.publish(message)

@@ -26,10 +26,11 @@ def test_subscribers_get_their_messages_in_recorded_order() -> None:
     whole: list[tuple[str, int, bytes]] = []
     with closing(Recording(ROOT / 'bags' / 'flawed')) as recording:
         for messages_, _ in recording.messages({POSE: 'p', TWIST: 't', ACCEL: 'a'}):
-            whole += messages_.each()
+            whole += messages_.iterate_messages()
         sizes = list(feed_subscribers(recording, [
-            Subscription({POSE: 'p'}, lambda found: poses.extend(found.each())),
-            Subscription({TWIST: 't', ACCEL: 'a'}, lambda found: others.extend(found.each()))]))
+            Subscription({POSE: 'p'}, lambda found: poses.extend(found.iterate_messages())),
+            Subscription({TWIST: 't', ACCEL: 'a'},
+                         lambda found: others.extend(found.iterate_messages()))]))
     assert sum(sizes) > 0
     assert poses == [each for each in whole if each[0] == 'p']
     assert others == [each for each in whole if each[0] != 'p']
@@ -46,9 +47,9 @@ def test_blocks_without_a_subscribers_messages_are_not_passed_to_it() -> None:
 
 def test_all_messages_of_a_block_are_passed_without_a_copy() -> None:
     found = messages.together([('p', b'12345'), ('p', b'678')], ['p', 't'])
-    assert found.selected({'p', 't'}) is found
-    assert found.selected({'p'}) is found
-    assert not len(found.selected({'t'}).times)
+    assert found.select_topics({'p', 't'}) is found
+    assert found.select_topics({'p'}) is found
+    assert not len(found.select_topics({'t'}).times)
 
 
 def test_recordings_are_read_by_no_other_loop() -> None:

@@ -138,7 +138,7 @@ def test_the_wrench_of_parts_is_that_of_whole_messages(split: str, stagger: int)
     measured = MeasuredLegs(parameters, ExternalWrench(parameters),
                             lambda *said: rejected.append(said), print)
     found = [estimate for *_, data in parts(legs(600), SPLITS[split], stagger)
-             if (estimate := measured.take(data, NO_WRENCH, None)) is not None]
+             if (estimate := measured.use_message(data, NO_WRENCH, None)) is not None]
     assert not rejected and len(found) > 590
     assert not any(each.mistake for each in found)
     # staggered stamps of values that were taken at once are off by up to 1.5 ms
@@ -152,7 +152,8 @@ def test_parts_without_stamps_are_rejected() -> None:
     writers = [JointStateWriter([joint]) for joint in JOINTS]
     for _ in range(3):
         for writer in writers:
-            assert measured.take(writer.write(0, [0.35], [0.0], [0.0]), NO_WRENCH, None) is None
+            data = writer.write(0, [0.35], [0.0], [0.0])
+            assert measured.use_message(data, NO_WRENCH, None) is None
     assert rejected == ['without a stamp'] * 3
 
 

@@ -30,7 +30,7 @@ MESSAGES = OutputMessages(PARAMETERS)
 def written(by: OutputMessages, outputs: Outputs, n: int = 0) -> dict[str, bytes]:
     """Return the messages of an output by topic; each topic once."""
     found: dict[str, bytes] = {}
-    for topic, having, messages in by.of(outputs):
+    for topic, having, messages in by.write_outputs(outputs):
         assert len(having) == len(messages) == len(outputs.stamps)
         if having[n]:
             assert topic not in found
@@ -129,7 +129,7 @@ def test_many_messages_are_those_of_one_after_the_other(action: str) -> None:
 def test_an_external_wrench_is_written_in_the_base_frame() -> None:
     parameters = PARAMETERS.replaced({'base_frame': 'sol'})
     wrench = (1.0, -2.0, 3.0, -4.0, 5.0, -6.0)
-    read = STORE.deserialize_cdr(OutputMessages(parameters).of_wrench(
+    read = STORE.deserialize_cdr(OutputMessages(parameters).write_wrench(
         STAMP, wrench), 'geometry_msgs/msg/WrenchStamped')
     assert read.header.frame_id == 'sol'
     assert read.header.stamp.sec * 10 ** 9 + read.header.stamp.nanosec == STAMP
@@ -143,10 +143,10 @@ def test_base_wrenches_are_written_alike_one_by_one_and_together(frame: str) -> 
     stamps = STAMP + 10 ** 9 * np.arange(4)
     wrenches = np.arange(24.0).reshape(4, 6) - 11.5
     wrenches[2] = np.nan
-    topic, having, many = by.of_base_wrenches(stamps, wrenches)
+    topic, having, many = by.write_base_wrenches(stamps, wrenches)
     assert OUTPUT_TYPES[topic] == 'geometry_msgs/msg/WrenchStamped'
     assert having.tolist() == [True, True, False, True]
-    one = [by.of_wrench(int(stamps[n]), wrenches[n].tolist()) for n in (0, 1, 3)]
+    one = [by.write_wrench(int(stamps[n]), wrenches[n].tolist()) for n in (0, 1, 3)]
     assert [each.tobytes() for each in many[having]] == one
     read = STORE.deserialize_cdr(one[1], OUTPUT_TYPES[topic])
     assert read.header.frame_id == frame or not frame

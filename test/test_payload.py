@@ -95,7 +95,7 @@ def recorded(moves: Any, seconds: float = 10.0, rate: float = 500.0, noise: Nois
     for stamp, row, force, of_base in zip(
             np.rint(times * 1e9).astype(int).tolist(), rows.tolist(), forces.tolist(), bases,
             strict=True):
-        history.add(tuple(force), Estimate(stamp, tuple(row), None, None, of_base),
+        history.add_measurement(tuple(force), Estimate(stamp, tuple(row), None, None, of_base),
                     more.get('known', NO_WRENCH))
     return history
 
@@ -103,7 +103,7 @@ def recorded(moves: Any, seconds: float = 10.0, rate: float = 500.0, noise: Nois
 def add_again(history: LegHistory, measurements: LegHistory, factor: float = 1.0) -> LegHistory:
     """Return a history to which measurements are added, their forces times a factor."""
     for row in measurements.rows(0, measurements.count):
-        history.add(tuple(factor * row[19:25]), Estimate(
+        history.add_measurement(tuple(factor * row[19:25]), Estimate(
             int(row[:1].view(np.int64)[0]), tuple(row[1:19]), None, None), NO_WRENCH)
     return history
 
@@ -143,7 +143,7 @@ def test_mass_center_and_inertia_are_those_of_pinocchio() -> None:
     for stamp, row, at in zip(np.rint(times * 1e9).astype(int).tolist(), motion.rows.tolist(),
                               range(many), strict=True):
         forces = referee.forces(middle[at], np.zeros(6)) + 0.3 * random.normal(size=6)
-        history.add(tuple(forces), Estimate(stamp, tuple(row), None, None), NO_WRENCH)
+        history.add_measurement(tuple(forces), Estimate(stamp, tuple(row), None, None), NO_WRENCH)
     payload = payload_of(history)
     assert known(payload) == list(NAMES) and payload.fitted.consistent
     assert np.abs(errors(payload)).max() < 1.5
@@ -352,7 +352,7 @@ def test_after_a_restart_only_what_follows_counts() -> None:
 def add(history: LegHistory, stamps: Sequence[int]) -> None:
     """Add measurements with these stamps, which are their forces as well."""
     for stamp in stamps:
-        history.add((float(stamp),) * 6, Estimate(
+        history.add_measurement((float(stamp),) * 6, Estimate(
             stamp, tuple(map(float, range(24))), None, None), NO_WRENCH)
 
 

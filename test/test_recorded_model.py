@@ -70,12 +70,12 @@ class Recorded:
         self.motion = random_motion(self.parameters, random, SAMPLES)
         self.stamps = STAMP + 33_000_000 * np.arange(SAMPLES)
         model = RecordedModel(self.parameters, 'hexapod')
-        (of_fixed, fixed), (of_urdf, described) = model.of_beginning(STAMP)
+        (of_fixed, fixed), (of_urdf, described) = model.write_beginning(STAMP)
         assert (of_fixed, of_urdf) == (TF_STATIC, ROBOT_DESCRIPTION)
         self.urdf: str = read(of_urdf, described[0]).data
-        self.rows = dict(model.of_rows(self.stamps, self.motion.rows))
+        self.rows = dict(model.write_motions(self.stamps, self.motion.rows))
         assert set(self.rows) == {JOINT_STATES, TF}
-        assert not dict(model.of_rows(self.stamps[:0], self.motion.rows[:0]))
+        assert not dict(model.write_motions(self.stamps[:0], self.motion.rows[:0]))
         self.trees = [
             links(read(TF, data), stamp) | links(read(of_fixed, fixed[0]), STAMP)
             for stamp, data in zip(self.stamps.tolist(), self.rows[TF], strict=True)]

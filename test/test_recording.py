@@ -79,7 +79,8 @@ def read(bag: Path, *topics: str) -> Read:
     recording = Recording(bag)
     try:
         keys = {topic: topic for topic in topics or recording.topics}
-        found = [each for block, _ in recording.messages(keys) for each in block.each()]
+        found = [each for block, _ in recording.messages(keys)
+                 for each in block.iterate_messages()]
         return Read(found, recording.missing, recording.notices)
     finally:
         recording.close()

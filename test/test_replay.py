@@ -255,7 +255,7 @@ def test_every_setpoint_is_answered_as_the_library_does(
 @pytest.mark.parametrize('name', ['clear', 'singular'])
 def test_the_bag_shows_the_hexapod_as_a_model(name: str, replayed: dict[str, Outputs]) -> None:
     given, model = setpoints_of(name), RecordedModel(PARAMETERS, 'stewart_dynamics')
-    written = dict(model.of_rows(np.array([*given]), library_motion(name).rows))
+    written = dict(model.write_motions(np.array([*given]), library_motion(name).rows))
     whens = [when for when, *_ in given.values()]
     of = recorded(replayed[name].folder / 'bag' / 'bag.mcap')
     joints = {when: data for topic, when, data in of if topic == JOINT_STATES}

@@ -156,7 +156,7 @@ def test_a_replay_gives_the_bits_of_the_step_and_states_where_the_base_is_not_kn
     with (tmp_path / 'out' / 'bag' / 'bag' / 'bag.mcap').open('rb') as file:
         content = file.read()
     for setpoint, _ in expected[5:20]:
-        _, having, message = written.of_base_wrenches(setpoint.stamps, load(setpoint))
+        _, having, message = written.write_base_wrenches(setpoint.stamps, load(setpoint))
         assert having[0]
         assert message[0].tobytes() in content
 

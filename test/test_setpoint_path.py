@@ -112,11 +112,11 @@ def test_a_restart_that_is_dropped_or_cannot_be_answered_holds_for_the_next(fed:
     fed.gather(day, sample=too_large)
     fed.node._answer_waiting()
     assert fed.counts[Rejection('setpoint', OUT_OF_RANGE)] == 1
-    assert state_record(fed.node._state)['restarting']
+    assert state_record(fed.node._setpoints.last_outputs().state)['restarting']
     fed.gather(day + 1)
     fed.node._answer_waiting()
     assert fed.answered(3)[2] == day + 1
-    assert not state_record(fed.node._state)['restarting']
+    assert not state_record(fed.node._setpoints.last_outputs().state)['restarting']
 
 
 def test_the_page_names_the_files_that_a_setpoint_runs_through(domain: int) -> None:
@@ -129,11 +129,8 @@ def test_the_page_names_the_files_that_a_setpoint_runs_through(domain: int) -> N
     finally:
         each.close()
     # These call functions in C, which no profile sees.
-    for caller, called in (('setpoints/input_stream.py', 'core/messages.c'),
-                           ('setpoints/input_stream.py', 'core/joining.c'),
-                           ('setpoints/step.py', 'core/setpoints.c'),
-                           ('setpoints/step.py', 'core/stewart_dynamics.c')):
-        found.insert(found.index(caller) + 1, called)
+    for called in ('stewart_dynamics.c', 'setpoints.c', 'messages.c', 'joining.c'):
+        found.insert(found.index('setpoints/input_stream.py') + 1, f'core/{called}')
     assert on_page == found
     assert len(found) <= MOST_FILES
 
@@ -152,7 +149,6 @@ def traced(fed: Fed) -> list[str]:
         if name not in found:
             found.append(name)
 
-    # The first messages of a topic teach their layout.
     for n in range(2):
         messages = HOME.messages(BEGIN + n)
         for topic in SEPARATE:

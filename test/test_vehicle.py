@@ -121,8 +121,8 @@ def test_messages_are_judged_as_recordings_are(wrong: Wrong | None, text: str) -
         nonlocal now
         for n in range(round(60.0 * seconds)):
             now += 1.0 / 60.0
-            vehicle.take(writer.write(round(1e9 * now), rates[n].tolist(), forces[n].tolist()),
-                         now)
+            data = writer.write(round(1e9 * now), rates[n].tolist(), forces[n].tolist())
+            vehicle.use_message(data, now)
             if n % 12 == 0:
                 vehicle.check(now)
 

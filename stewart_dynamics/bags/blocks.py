@@ -138,7 +138,7 @@ class RowsFile:
                 self.missing.append(
                     f'everything after {count + len(times)} messages: {one_line(exc)}')
             count += len(times)
-            yield Messages.of(names, of_topic, times, messages), size
+            yield Messages.from_bytes(names, of_topic, times, messages), size
 
 
 def of_good_length(blocks: Iterator[tuple[Messages, int]]) -> Iterator[tuple[Messages, int]]:
@@ -190,6 +190,6 @@ def _decompressed(block: Messages) -> Iterator[Messages]:
         messages.append(message)
         size += len(message)
         if size >= MOST_BYTES or n == len(block.times):
-            yield Messages.of(block.topics, block.of_topic[first:n].tolist(),
+            yield Messages.from_bytes(block.topics, block.of_topic[first:n].tolist(),
                               block.times[first:n].tolist(), messages)
             messages, first, size = [], n, 0

@@ -31,7 +31,7 @@ def feed_subscribers(recording: Recording, subscriptions: Sequence[Subscription]
     names = {topic: name for each in subscriptions for topic, name in each.topics.items()}
     for messages, size in recording.messages(names):
         for topics, use in subscriptions:
-            chosen = messages.selected(set(topics.values()))
+            chosen = messages.select_topics(set(topics.values()))
             if len(chosen.times):
                 use(chosen)
         yield size

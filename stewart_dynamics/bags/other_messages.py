@@ -77,7 +77,7 @@ class Converter:
             return block
         numbers, times, messages = [], [], []
         for number, slash, (name, time, data) in zip(
-                block.of_topic.tolist(), slashes.tolist(), block.each(), strict=True):
+                block.of_topic.tolist(), slashes.tolist(), block.iterate_messages(), strict=True):
             convert = self._of.get(name)
             try:
                 data = _without_slash(data) if slash else data
@@ -87,7 +87,7 @@ class Converter:
             numbers += [number] * len(made)
             times += [time] * len(made)
             messages += made
-        return Messages.of(block.topics, numbers, times, messages)
+        return Messages.from_bytes(block.topics, numbers, times, messages)
 
     def _slashes(self, block: Messages) -> Flags:
         """Return which messages (M,) have a frame_id that begins with a slash."""

@@ -64,7 +64,7 @@ def read_bag(path: Path, parameters: Parameters, node: str, measured: str | None
             leg_values.append(states.values)
 
         def add_poses(messages: Messages) -> None:
-            for _, _, data in messages.each():
+            for _, _, data in messages.iterate_messages():
                 try:
                     stamp, _, values, _ = read_message(type_names.POSE_STAMPED, data)
                 except MalformedError:

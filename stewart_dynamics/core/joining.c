@@ -65,7 +65,7 @@ typedef struct {
   int64_t newest, count, stamps[OF_BASE];  /* samples of the base: a ring */
   stewart_base bases[OF_BASE];
   const stewart_platform * platform;  /* that answers setpoints, from this state */
-  stewart_state state;
+  stewart_state * state;
   message_rows answers;
   stream_memory at;
 } input_stream;
@@ -104,14 +104,14 @@ void begin_stream(
 }
 
 void put_answers(
-  uint8_t * memory, const stewart_platform * platform, const stewart_platform * servos,
-  int64_t size, const uint8_t * message, int64_t n_stamps, const int64_t * stamp_places,
+  uint8_t * memory, const stewart_platform * platform, stewart_state * state,
+  const stewart_platform * servos, int64_t size, const uint8_t * message, int64_t n_stamps, const int64_t * stamp_places,
   int64_t n_parts, const message_part * parts, int64_t n_kinds,
   const message_condition * conditions) {
   input_stream * stream = (input_stream *)memory;
   message_rows rows = {
     servos, size, message, n_stamps, stamp_places, n_parts, parts, n_kinds, conditions};
-  stream->platform = platform, stream->answers = rows;
+  stream->platform = platform, stream->state = state, stream->answers = rows;
 }
 
 int64_t stamp_order(int64_t stamp, int64_t known, int64_t last, int64_t timeout) {
@@ -431,7 +431,7 @@ void put_memory(
 static void answer_from(input_stream * stream, int64_t n, int64_t end) {
   const stream_memory * at = &stream->at;
   const message_rows * rows = &stream->answers;
-  step_setpoints(stream->platform, 0, end - n, at->stamps + n, at->setpoints + n, &stream->state,
+  step_setpoints(stream->platform, 0, end - n, at->stamps + n, at->setpoints + n, stream->state,
                  at->outputs + n);
   write_rows(rows, NUMBERS(stewart_output), end - n, at->stamps + n,
              (const double *)(at->outputs + n), at->messages + n * rows->size,

@@ -243,11 +243,11 @@ void begin_stream(
   int64_t timeout, int64_t base_timeout, int64_t source, const double * gravity,
   const imu_mounting * imu);
 
-/* The platform that answers setpoints, and the messages of an answer, as for write_messages: the
-   arrays stay where they are. The state of the step stays as it is. */
+/* The platform that answers setpoints, the state of its step, and the messages of an answer, as for
+   write_messages: the arrays stay where they are. */
 void put_answers(
-  uint8_t * memory, const stewart_platform * platform, const stewart_platform * servos,
-  int64_t size, const uint8_t * message, int64_t n_stamps, const int64_t * stamp_places,
+  uint8_t * memory, const stewart_platform * platform, stewart_state * state,
+  const stewart_platform * servos, int64_t size, const uint8_t * message, int64_t n_stamps, const int64_t * stamp_places,
   int64_t n_parts, const message_part * parts, int64_t n_kinds,
   const message_condition * conditions);
 

@@ -127,7 +127,7 @@ class CueingNode(ManagedNode[CueingParameters]):
 
     def _on_vehicle(self, data: bytes) -> None:
         if self._active:
-            self._vehicle.take(data, self._now / SECOND)
+            self._vehicle.use_message(data, self._now / SECOND)
 
     def _on_legs(self, data: bytes) -> None:
         """Start the approach from where the platform stands."""

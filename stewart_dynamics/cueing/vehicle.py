@@ -177,7 +177,8 @@ class Vehicle:
     Follows ``~/vehicle``.
 
     reading (6,): last specific force [m/s^2] and angular velocity [rad/s].
-    heard: time of the last one, by the clock of ``take`` [s]. mistake: the possible error in them.
+    heard: time of the last one, by the clock of ``use_message`` [s].
+    mistake: the possible error in them.
     """
 
     def __init__(self, parameters: Parameters, rejections: Rejections, notice: Any) -> None:
@@ -195,7 +196,7 @@ class Vehicle:
         self._begin, self._count = -math.inf, 0  # of the block that is not complete
         self.kind = parameters.cueing.input
 
-    def take(self, data: bytes, now: float) -> None:
+    def use_message(self, data: bytes, now: float) -> None:
         """Take a message at a time [s]."""
         samples = self._reader.read_samples(Messages.single(VEHICLE, data))
         if not len(samples.stamps) or not self._in_order(int(samples.stamps[0])):

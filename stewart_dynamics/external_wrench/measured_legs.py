@@ -53,7 +53,7 @@ class LegHistory:
         self._rows = np.zeros((self.capacity, OF_BASE.stop))
         self._memory = self._rows.data.cast('B')
 
-    def add(self, forces: Six, estimate: Estimate, known: Six) -> None:
+    def add_measurement(self, forces: Six, estimate: Estimate, known: Six) -> None:
         """Add a measurement with the forces since the one before and the load on ``~/wrench``."""
         _ROW.pack_into(
             self._memory, self.count % self.capacity * _ROW.size, estimate.stamp,
@@ -173,13 +173,13 @@ class MeasuredLegs:
             return PossibleError(STAMPS, self._stamps.present[0])
         return self._rates.mistake or self._efforts.mistake
 
-    def use(self, parameters: Parameters, step: ExternalWrench) -> None:
+    def use_parameters(self, parameters: Parameters, step: ExternalWrench) -> None:
         """Use changed parameters from now on."""
         self._step, self._of_motors = step, EffortsOfMotors(parameters)
         if self._efforts.mistake is not None:
             self._efforts = EffortCheck(parameters)  # they may have been the mistake
 
-    def take(self, data: bytes, known: Six, target: Target | None,
+    def use_message(self, data: bytes, known: Six, target: Target | None,
              base: BaseInput | None = None) -> Estimate | None:
         """
         Return the estimate from a sensor_msgs/JointState (CDR), or None where it is rejected.
@@ -215,7 +215,7 @@ class MeasuredLegs:
         mistake = self.mistake
         self._last = last if mistake is None else last._replace(mistake=mistake)
         if self._history is not None:
-            self._history.add(measurement.efforts, self._last, known)
+            self._history.add_measurement(measurement.efforts, self._last, known)
         return self._last
 
     def _reject(self, reason: str, details: str) -> None:

@@ -27,7 +27,7 @@ class Messages(NamedTuple):
     sizes: Integers  # (M,): length of each [bytes]
 
     @classmethod
-    def of(cls, topics: tuple[str, ...], of_topic: Sequence[int], times: Sequence[int],
+    def from_bytes(cls, topics: tuple[str, ...], of_topic: Sequence[int], times: Sequence[int],
            messages: Sequence[bytes]) -> Messages:
         """Join single messages."""
         sizes = np.array([len(message) for message in messages], dtype=np.int64)
@@ -46,7 +46,7 @@ class Messages(NamedTuple):
         return self._replace(of_topic=self.of_topic[which], times=self.times[which],
                              starts=self.starts[which], sizes=self.sizes[which])
 
-    def selected(self, names: Container[str]) -> Messages:
+    def select_topics(self, names: Container[str]) -> Messages:
         """Return the messages of some topics."""
         which = np.array([topic in names for topic in self.topics])[self.of_topic]
         return self if which.all() else self.chosen(which)
@@ -75,14 +75,14 @@ class Messages(NamedTuple):
         """Return the bytes of a message, however many, without a copy."""
         return self.data[self.starts[n]:self.starts[n] + self.sizes[n]].data
 
-    def each(self) -> Iterator[tuple[str, int, bytes]]:
+    def iterate_messages(self) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, time and bytes of each message."""
         for topic, time, start, size in zip(
                 self.of_topic.tolist(), self.times.tolist(), self.starts.tolist(),
                 self.sizes.tolist(), strict=True):
             yield self.topics[topic], time, self.data[start:start + size].tobytes()
 
-    def places(self) -> dict[str, Integers]:
+    def find_places(self) -> dict[str, Integers]:
         """Return the indices of the messages of each topic that has any."""
         places: dict[str, Integers] = {}
         for n, topic in enumerate(self.topics):

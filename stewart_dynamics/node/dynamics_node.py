@@ -241,7 +241,7 @@ class DynamicsNode(ManagedNode[Parameters]):
                 self._setpoints.reject('setpoint', *reason)
             return
         if self._base_wrench_read:
-            topic, known, messages = self._models.messages.of_base_wrenches(
+            topic, known, messages = self._models.messages.write_base_wrenches(
                 outputs.stamps, self._models.base_wrench(setpoint))
             if known[0]:
                 self._topics.publishers[topic].publish(messages.tobytes())
@@ -317,7 +317,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         diagnostics = self._diagnostics.external_wrench
         diagnostics.heard(now)
         target = self._target()
-        estimate = self._measured_legs.take(
+        estimate = self._measured_legs.use_message(
             data, self._setpoints.wrench, target, self._setpoints.base)
         if estimate is None:
             return
@@ -326,7 +326,7 @@ class DynamicsNode(ManagedNode[Parameters]):
             self._joint_states.publish_due(now)
         if estimate.published is not None:
             self._topics.publishers[EXTERNAL_WRENCH].publish(
-                self._models.messages.of_wrench(estimate.stamp, estimate.published))
+                self._models.messages.write_wrench(estimate.stamp, estimate.published))
         diagnostics.estimated(estimate, target and target.motion, now)
         if self._diagnostics.level_changed(now):
             self._report()
@@ -435,7 +435,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._models = models = _Models.of(parameters)
         if self._active:
             self._setpoints.answer_setpoints(models.step, models.messages, self._publish_answer)
-            self._measured_legs.use(parameters, models.external_wrench)
+            self._measured_legs.use_parameters(parameters, models.external_wrench)
             self._diagnostics.answers.parameters = parameters
             self._markers.write = Markers(parameters).write  # a payload moves the centre of mass
             self._travel.use(parameters)

@@ -117,7 +117,7 @@ class Differentiator:
         position, angle = np.sqrt(self._squares / max(self._gathered, 1)).tolist()
         return Deviation(position, float(self._largest[0]), angle, float(self._largest[1]))
 
-    def add(self, batch: Batch) -> Batch:
+    def add_setpoints(self, batch: Batch) -> Batch:
         """
         Add setpoints that have only poses; return those that are done, with their motion.
 

@@ -220,7 +220,7 @@ class _Run:
         self._files.write_inputs(messages)
         setpoints = self._setpoints.join_messages(messages)
         if self._differentiator is not None:
-            setpoints = self._differentiator.add(setpoints)
+            setpoints = self._differentiator.add_setpoints(setpoints)
         self._answer(setpoints)
 
     def take_table(self, table: CsvMotion) -> None:
@@ -392,7 +392,7 @@ class _Run:
     def _take_measured(self, messages: Messages) -> None:
         """Process messages of the measured legs or poses."""
         if self._response is not None:
-            self._response.take(messages)
+            self._response.read_messages(messages)
             if self._first_measured and not self._efforts_recorded(messages):
                 self._comparison = None  # the response needs none
             self._first_measured = False

@@ -80,14 +80,15 @@ class RecordedModel:
         self._moving = transforms(self._links.moving)
         self._fixed = transforms(self._links.fixed)
 
-    def of_beginning(self, stamp: int) -> Iterator[tuple[str, NDArray[np.void]]]:
+    def write_beginning(self, stamp: int) -> Iterator[tuple[str, NDArray[np.void]]]:
         """Yield topics and messages (1,) of the constant parts, at a stamp [ns]."""
         yield TF_STATIC, self._fixed.write(
             np.array([stamp]), *self._links.at_fixed[:, None])
         text = string(self._urdf)
         yield ROBOT_DESCRIPTION, np.frombuffer(text, dtype=f'V{len(text)}')
 
-    def of_rows(self, stamps: Stamps, poses: Array) -> Iterator[tuple[str, NDArray[np.void]]]:
+    def write_motions(
+            self, stamps: Stamps, poses: Array) -> Iterator[tuple[str, NDArray[np.void]]]:
         """Yield topics and messages (N,) of stamps (N,) [ns] and rows of motion (N, MOTION)."""
         if not len(stamps):
             return
@@ -149,8 +150,8 @@ class OutputBag:
             return
         groups: list[_Group] = []
         for topic, having, messages in (
-                *self._messages.of(outputs),
-                self._messages.of_base_wrenches(outputs.stamps, block.base_wrenches)):
+                *self._messages.write_outputs(outputs),
+                self._messages.write_base_wrenches(outputs.stamps, block.base_wrenches)):
             which = np.flatnonzero(having)
             groups.append((topic, which, messages[which]))
         groups += self._of_model(times, block.setpoints.motions, outputs)
@@ -161,7 +162,7 @@ class OutputBag:
         if not len(recorded.times):
             return
         groups: list[_Group] = []
-        for topic, places in recorded.places().items():
+        for topic, places in recorded.find_places().items():
             sizes = recorded.sizes[places]
             for size in np.unique(sizes).tolist():
                 which = places[sizes == size]
@@ -197,10 +198,10 @@ class OutputBag:
     def _of_model(self, times: Stamps, motions: Array, outputs: Outputs) -> Iterator[_Group]:
         """Yield the messages that show the model, as often as they are due."""
         if self._period and self._due is None:
-            for topic, messages in self._model.of_beginning(int(outputs.stamps[0])):
+            for topic, messages in self._model.write_beginning(int(outputs.stamps[0])):
                 yield topic, np.zeros(1, dtype=np.int64), messages
         which = np.array([*self._when_due(times.tolist())], dtype=np.int64)
-        for topic, messages in self._model.of_rows(outputs.stamps[which], motions[which]):
+        for topic, messages in self._model.write_motions(outputs.stamps[which], motions[which]):
             yield topic, which, messages
 
     def _when_due(self, times: Sequence[int]) -> Iterator[int]:

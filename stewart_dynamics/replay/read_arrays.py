@@ -219,12 +219,12 @@ def read_legs(
     with closing(Recording(Path(os.fspath(path)))) as recording:
         name = find_measured_legs(recording, node_name(node), topic)
 
-        def add(messages: Messages) -> None:
+        def read_states(messages: Messages) -> None:
             for field, reader in readers.items():
                 states = reader.read_states(messages)
                 found[field].append((states.stamps, states.values))
 
-        read_all(recording, [Subscription({name: _LEGS}, add)])
+        read_all(recording, [Subscription({name: _LEGS}, read_states)])
         missing = tuple(recording.missing)
     stamps, rows = {}, {}
     for field, reader in readers.items():

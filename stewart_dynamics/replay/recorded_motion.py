@@ -64,12 +64,12 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         setpoints = Setpoints(parameters, lambda rejection, details: None, lambda text: None)
         setpoints.unknown_angles = recording.unknown_angles
 
-        def add(messages: Messages) -> None:
+        def join_messages(messages: Messages) -> None:
             batch = setpoints.join_messages(messages)
-            batches.append(batch if splines is None else splines.add(batch))
+            batches.append(batch if splines is None else splines.add_setpoints(batch))
 
         for size in feed_subscribers(recording, [
-                Subscription({name: key for key, name in topics.items()}, add)]):
+                Subscription({name: key for key, name in topics.items()}, join_messages)]):
             progress(size)
         setpoints.end('the bag ends')
         if splines is not None:

@@ -80,7 +80,7 @@ class RecordedResponse:
         """Add setpoints."""
         self._commanded.add(setpoints.stamps, setpoints.motions[:, POSE], setpoints.times)
 
-    def take(self, messages: Messages) -> None:
+    def read_messages(self, messages: Messages) -> None:
         """Add messages of the measured legs or poses."""
         if self.key == MEASURED:
             self._take_legs(messages)

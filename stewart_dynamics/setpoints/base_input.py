@@ -75,10 +75,10 @@ class BaseInput:
     def join_message(self, topic: str, data: bytes, clock: Clock) -> bool:
         """Use a message, see ``InputStream``; return whether it completes a sample."""
         joined = self._stream.join_message(topic, data, clock)
-        self.note(joined)
+        self.note_samples(joined)
         return len(joined.base_stamps) > 0
 
-    def note(self, joined: Joined) -> None:
+    def note_samples(self, joined: Joined) -> None:
         """Note new samples, which may change with the next call of the stream, for the checks."""
         stamps, values = joined.base_stamps, joined.base_values
         if not len(stamps):
@@ -87,4 +87,4 @@ class BaseInput:
         if self._gravity is not None:
             self._gravity.add_samples(stamps.tolist(), joined.base_rows.tolist())
         if self.consistency is not None:
-            self.consistency.note(stamps.copy(), values.copy(), joined.base_restarts > 0.0)
+            self.consistency.note_samples(stamps.copy(), values.copy(), joined.base_restarts > 0.0)

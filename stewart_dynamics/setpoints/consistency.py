@@ -133,7 +133,7 @@ class Consistency:
         if len(self.noted) >= _GATHERED:
             self._steps = self._take_noted()
 
-    def note(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
+    def note_samples(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
         """Add N samples as ``add`` does; a single one is left to ``judge``."""
         if len(stamps) == 1:
             self.noted.append((stamps[0], motions[0], restarts[0]))

@@ -103,6 +103,7 @@ class InputStream:
         self._progress = self._progress_record.view(np.int64).data
         self._last: tuple[Stamps, Array] = np.zeros(1, np.int64), np.zeros((1, BASE))
         self._last_base = function('last_base').bound(self._memory, *self._last)
+        self._state = FIRST.copy()  # of the step
         self._join = function('join_messages').bound(self._memory)
         self._answer = function('answer_setpoints').bound(self._memory)
         self._answers: tuple[Step, MessageRows, Callable[[dict[str, bytes]], object]] | None = None
@@ -137,7 +138,7 @@ class InputStream:
         publish: called with the messages of each answer by topic, before ``join_messages`` ends.
         """
         self._answers = step, messages.rows, publish
-        function('put_answers')(self._memory, step.hexapod, *messages.rows.arguments)
+        function('put_answers')(self._memory, step.hexapod, self._state, *messages.rows.arguments)
         self._reserve_memory(*self._room)
 
     def hold_answers(self, held: bool) -> None:
@@ -163,10 +164,10 @@ class InputStream:
                     having[n].tolist(), rows.parts, strict=True) if has})
 
     def last_outputs(self) -> Outputs:
-        """Return the outputs of the last single setpoint; the stream keeps the step's state."""
+        """Return the outputs of the last single setpoint."""
         assert self._answers is not None
         return self._answers[0].outputs_of(
-            self._joined.stamps[:1].copy(), self._written[0][:1].copy(), FIRST)
+            self._joined.stamps[:1].copy(), self._written[0][:1].copy(), self._state.copy())
 
     def join_message(self, topic: str, data: bytes, clock: Clock) -> Joined:
         """Join one message; without arrays, which would take longer than all else."""

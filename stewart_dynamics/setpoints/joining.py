@@ -130,7 +130,7 @@ class Setpoints:
     def _note_joined(self, joined: Joined, times: Stamps | None) -> Batch:
         """Note what is joined for the checks; return the setpoints."""
         if len(joined.base_stamps):
-            self.base.note(joined)
+            self.base.note_samples(joined)
         if not len(joined.stamps):
             return self._none
         stamps = joined.stamps.copy()
@@ -153,7 +153,7 @@ class Setpoints:
         self._stream.answer_setpoint(setpoint)
 
     def last_outputs(self) -> Outputs:
-        """Return the outputs of the last single setpoint; the stream keeps the step's state."""
+        """Return the outputs of the last single setpoint."""
         return self._stream.last_outputs()
 
     def _note_setpoints(self) -> None:
@@ -164,7 +164,7 @@ class Setpoints:
                 self._first = motions[0].copy()
             self._last = motions[-1]
             if self._consistency is not None:
-                self._consistency.note(setpoints.stamps, motions, setpoints.restarts)
+                self._consistency.note_samples(setpoints.stamps, motions, setpoints.restarts)
         self._unchecked.clear()
 
     def end(self, why: str) -> None:

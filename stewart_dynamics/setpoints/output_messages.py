@@ -107,7 +107,7 @@ class OutputMessages:
         self.rows = MessageRows(kinds, OUTPUT, servos)
         self._wrench = StampedWriter(parameters.base_frame, 6)
 
-    def of(self, outputs: Outputs) -> list[tuple[str, Flags, NDArray[np.void]]]:
+    def write_outputs(self, outputs: Outputs) -> list[tuple[str, Flags, NDArray[np.void]]]:
         """
         Return the messages for outputs, in the order in which they are published for one.
 
@@ -115,11 +115,11 @@ class OutputMessages:
         """
         return self.rows.write(outputs.stamps, outputs.rows)
 
-    def of_wrench(self, stamp: int, wrench: Sequence[float]) -> bytes:
+    def write_wrench(self, stamp: int, wrench: Sequence[float]) -> bytes:
         """Return the geometry_msgs/WrenchStamped of a wrench in base axes."""
         return self._wrench.write(stamp, wrench)
 
-    def of_base_wrenches(self, stamps: Stamps, base_wrenches: Array) -> tuple[
+    def write_base_wrenches(self, stamps: Stamps, base_wrenches: Array) -> tuple[
             str, Flags, NDArray[np.void]]:
         """Return messages for stamps (N,) [ns] and wrenches (N, 6); none for rows of nan."""
         messages = self._wrench.layout.write(stamps, base_wrenches)
