@@ -86,7 +86,7 @@ def test_joints_in_the_frame_of_the_other_body_are_named(seed: int) -> None:
             ('geometry.platform_joints', platform + home.position,
              'platform_joints in the base frame')):
         wrong = p.replaced({name: joints.ravel()})
-        assert mistake_of(position, turn, wrong) == f'likely mistake: geometry.{text}'
+        assert mistake_of(position, turn, wrong) == f'possible error: geometry.{text}'
         # Poses of that file itself are possible.
         moved = home_pose(wrong)
         assert mistake_of(moved.position, moved.rotation, wrong) == ''

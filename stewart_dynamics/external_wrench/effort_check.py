@@ -37,7 +37,7 @@ class EffortCheck:
         self._begin()
         self._shortest = 1
         self.mistake: PossibleError | None = None
-        """The likely mistake; None without one."""
+        """The possible error; None without one."""
 
     def _begin(self) -> None:
         self._count, self._since = 0, 0

@@ -98,7 +98,7 @@ class Estimate(NamedTuple):
     """Measured - model efforts, not filtered (6); none of the first measurement."""
     base: tuple[float, ...] = NO_BASE  # a row of the base's motion; of nan: it is still
     overloads: tuple[Overload, ...] = ()
-    mistake: PossibleError | None = None  # likely mistake in the measurements
+    mistake: PossibleError | None = None  # possible error in the measurements
 
     @property
     def published(self) -> Six | None:

@@ -168,7 +168,7 @@ class MeasuredLegs:
 
     @property
     def mistake(self) -> PossibleError | None:
-        """Likely mistake in stamps, velocities or efforts: the former may look like the latter."""
+        """Possible error in stamps, velocities or efforts: the former may look like the latter."""
         if self._stamps.present is not None:
             return PossibleError(STAMPS, self._stamps.present[0])
         return self._rates.mistake or self._efforts.mistake

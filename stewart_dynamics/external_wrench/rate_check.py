@@ -40,7 +40,7 @@ class RateCheck:
         self._consistency = Consistency(parameters.singularity.characteristic_length, None)
         self._recent: deque[Measurement] = deque(maxlen=_RECENT)
         self.mistake: PossibleError | None = None
-        """The likely mistake; None without one."""
+        """The possible error; None without one."""
 
     def add(self, measurement: Measurement, estimate: Estimate) -> None:
         """Add a measurement, and the estimate from it; one without a wrench is a restart."""

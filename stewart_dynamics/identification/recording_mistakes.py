@@ -137,7 +137,7 @@ def of_no_pose(p: Parameters, positions: Array) -> str:
 
 
 def of_delay(delays: Iterable[float]) -> Iterator[PossibleError]:
-    """Yield a likely mistake for bags with these delays of the efforts [s]."""
+    """Yield a possible error for bags with these delays of the efforts [s]."""
     longest = max(delays, key=abs)
     if abs(longest) >= LONGEST_LAG:
         yield PossibleError(
@@ -147,7 +147,7 @@ def of_delay(delays: Iterable[float]) -> Iterator[PossibleError]:
 
 
 def of_efforts(comparison: Comparison, p: Parameters, of_motors: bool) -> Iterator[PossibleError]:
-    """Yield a likely mistake in sign or unit of the efforts."""
+    """Yield a possible error in sign or unit of the efforts."""
     scales = comparison.best_scales()
     if scales[0] == 0.0:
         likeliest = 0.0

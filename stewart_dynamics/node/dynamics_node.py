@@ -339,7 +339,7 @@ class DynamicsNode(ManagedNode[Parameters]):
             return payload.PayloadOutcome(silence)
         mistake = self._measured_legs.mistake
         if mistake is not None and mistake.what != SCALE:
-            return payload.PayloadOutcome(f'likely mistake: {mistake.text}')
+            return payload.PayloadOutcome(f'possible error: {mistake.text}')
         # Parameters are those of now, whatever changes meanwhile.
         return payload.identify(self._history, StewartPlatform(self._settings))
 

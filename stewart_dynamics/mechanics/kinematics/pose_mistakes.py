@@ -130,7 +130,7 @@ def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
             for error, without in transforms.items():
                 right = without(*right) if right and error in each else right
             if right and is_possible(*right):
-                return f'likely mistake: {" and ".join(each)}'
+                return f'possible error: {" and ".join(each)}'
         return other_side(_legs(parameters, position, rotation)[1], at_home) if first else ''
 
 

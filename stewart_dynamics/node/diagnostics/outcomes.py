@@ -123,10 +123,10 @@ class ExternalWrenchDiagnostics(StatusPart):
 
 
 def _mistake(found: PossibleError) -> Mistake:
-    """Return the likely mistake in the efforts for the status."""
+    """Return the possible error in the efforts for the status."""
     wrench = '' if found.what == SCALE else '; no external wrench is published'
-    return Mistake(MEASURED_LEGS, f'likely mistake: {found.text}{wrench}', values=(
-        ('likely mistake in the measurements', found.what),))
+    return Mistake(MEASURED_LEGS, f'possible error: {found.text}{wrench}', values=(
+        ('possible error in the measurements', found.what),))
 
 
 def _apart(motion: Sequence[float], target: Sequence[float]) -> tuple[float, float]:
