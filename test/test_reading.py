@@ -229,7 +229,7 @@ def test_a_limit_that_is_added_to_a_file_without_it_is_read(
     ('sdf', r'(<(?:lower|upper|effort|velocity)>)[^<]*'),
     ('urdf', r'((?:lower|upper|effort|velocity)=")[^"]*')])
 def test_limits_that_are_inf_are_unlimited(kind, pattern, tmp_path):
-    """SDFormat has this default since version 1.10, and libsdformat writes it."""
+    """The default of SDFormat is inf since version 1.10."""
     found = read_hexapod(written(PLATFORM, kind, tmp_path, lambda text: re.sub(
         pattern, r'\1inf', text))).parameters
     assert all(found[name] is None for name in PLATFORM.leg_kind.drive_limits)
