@@ -9,13 +9,14 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from stewart_dynamics.description.sdf import POSITION
-from stewart_dynamics.description.xml_model import carried_of, Defaults, DRAKE, XmlModel
+from stewart_dynamics.description.sdf import DRAKE, POSITION
+from stewart_dynamics.description.xml_model import carried_of, Defaults, XmlModel
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.legs.mechanism import (
     DescriptionError, FIXED, HERE, Joint, Mechanism, MechanismBody, Placement, WORLD)
 
 SDFORMAT = Defaults(axis='0 0 1', mass=1.0, moment=1.0, least=0.0)
+_DRAKE = f'{{{DRAKE}}}'
 _MODEL = '__model__'
 # The end of the name of Gazebo's system, which was another in Ignition.
 _DETACHABLE = '::systems::DetachableJoint'
@@ -41,7 +42,7 @@ def read_sdf(root: ET.Element, source: Path) -> Mechanism:
              and plugin.findtext('child_model', '').strip() == _MODEL]
     # Both close the same loops in files of stewart_describe.
     joints += fixed or [reader.constraint(each)
-                        for each in model.findall(f'{DRAKE}ball_constraint')]
+                        for each in model.findall(f'{_DRAKE}ball_constraint')]
     mechanism = Mechanism(
         str(source), model.get('name', source.stem),
         {link.get('name', ''): reader.body(link) for link in model.findall('link')}, joints)
@@ -99,8 +100,8 @@ class _SdfModel(XmlModel):
         """Return a joint at its frame, with the inertia of its rotor."""
         name = joint.get('name', '')
         made = self.joint(joint, self.place(name), self.number(joint, name, 0.0, POSITION))
-        gear = self.number(joint, name, 1.0, f'{DRAKE}gear_ratio')
-        made.armature = gear ** 2 * self.number(joint, name, 0.0, f'{DRAKE}rotor_inertia')
+        gear = self.number(joint, name, 1.0, f'{_DRAKE}gear_ratio')
+        made.armature = gear ** 2 * self.number(joint, name, 0.0, f'{_DRAKE}rotor_inertia')
         return made
 
     def axis_frame(self, axis: ET.Element, at: Placement) -> Placement:
@@ -120,7 +121,7 @@ class _SdfModel(XmlModel):
 
     def constraint(self, element: ET.Element) -> Joint:
         """Return the ball joint of a constraint of Drake."""
-        key = f'{DRAKE}ball_constraint'
+        key = f'{_DRAKE}ball_constraint'
         first, second = (
             (self.link(element.findtext(f'{key}_{body}', '').strip(), 'drake:ball_constraint'),
              self.numbers(element.findtext(f'{key}_{point}'), 3, point))

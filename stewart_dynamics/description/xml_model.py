@@ -29,7 +29,6 @@ _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': S
 _LIMITS = {'lower': 'lower', 'upper': 'upper', 'velocity': 'velocity_max', 'effort': 'force_max'}
 # Unlimited: SDFormat's default is 1e16 or, from version 1.10 on, inf.
 _UNLIMITED, _INFINITE = 1e15, ('inf', '+inf', '-inf')
-DRAKE = '{http://drake.mit.edu}'
 _Default = TypeVar('_Default', bound=float | None)
 
 
