@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Draw the pictures of README.md and docs/ into docs/figures/.
+Draw the pictures of docs/ into docs/figures/; the README's: badges.py, moving.py.
 
 ``make docs`` runs it. The paper's motion is drawn from bags/singular through the joining and the
 step of node and replay; loop and ship are what demo/loop.py and demo/ship.py measure, which also
@@ -125,17 +125,6 @@ def draw_platform(axes: Any, recorded: Recorded) -> None:
     axes.legend(loc='upper left', frameon=False)
 
 
-def draw_singular(path: Path, recorded: Recorded) -> None:
-    """Draw det(J) above the leg forces."""
-    figure, (above, below) = pyplot.subplots(
-        2, 1, sharex=True, figsize=(8, 6), height_ratios=(2, 3), layout='constrained')
-    draw_determinant(above, recorded)
-    draw_forces(below, recorded)
-    below.set_xlabel('time  [s]')
-    below.set_xlim(recorded.seconds[0], recorded.seconds[-1])
-    save(figure, path)
-
-
 def draw_figures(path: Path, recorded: Recorded) -> None:
     """Draw the paper's figures 12 to 18."""
     figure = pyplot.figure(figsize=(11, 17), layout='constrained')
@@ -224,7 +213,6 @@ def main() -> None:
     recorded = Recorded.of(ROOT / 'bags' / 'singular')
     pyplot.rcParams.update({'font.size': 10, 'axes.grid': True, 'grid.color': '0.88',
                             'axes.spines.top': False, 'axes.spines.right': False})
-    draw_singular(HERE / 'singular.png', recorded)
     draw_figures(HERE / 'paper.png', recorded)
     draw_report(HERE / 'report.png')
     draw_datasheet(HERE / 'datasheet.png')
