@@ -8,6 +8,7 @@ from __future__ import annotations
 from contextlib import redirect_stdout
 import importlib
 import io
+import json
 from pathlib import Path
 import re
 import sys
@@ -76,6 +77,12 @@ def test_the_simulator_s_topics_are_those_of_the_code() -> None:
             **simulator_messages.BASE_TYPES, MOTOR_STATES: MOTOR_TYPES[MOTOR_STATES],
             simulator_messages.IMU: simulator_messages.IMU_TYPE}.items():
         assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in TEXTS['docs/simulator.md']
+
+
+def test_the_readme_has_the_figures_of_its_demo() -> None:
+    figures = json.loads((ROOT / 'docs' / 'figures' / 'loop.json').read_text(encoding='utf-8'))
+    alone, forward = (run['peak']['position'] / 1e3 for run in figures['runs'][:2])
+    assert f'by {alone:.1f} mm, with them by {forward:.3f} mm' in ' '.join(README.split())
 
 
 def test_the_example_of_the_readme_runs(
