@@ -7,7 +7,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-calibrate bench-capability bench-coverage bench-export bench-gpu bench-identify bench-lack-of-fit bench-loop bench-node bench-planned \
   bench-replay bench-response clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship demo-tune docs docs-site export-demo installed \
-  lint lint-flake8 lint-layers lint-mypy lint-pep257 lint-ruff pytest test test-gpu test-release tools wheels
+  lint lint-flake8 lint-forms lint-layers lint-mypy lint-pep257 lint-ruff pytest test test-gpu test-release tools wheels
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -98,7 +98,7 @@ test-gpu: $(TOOLS)
 	@$(VENV)/bin/python -c 'import cupy' 2> /dev/null || $(PIP) install --requirement requirements-gpu.txt
 	$(VENV)/bin/python -m pytest test/test_gpu_on_device.py test/test_gpu.py test/test_hexapod_env.py
 
-LINTERS := lint-mypy lint-flake8 lint-pep257 lint-ruff lint-layers
+LINTERS := lint-mypy lint-flake8 lint-pep257 lint-ruff lint-layers lint-forms
 
 # Beside one another: mypy and flake8 take nearly the same time.
 lint: $(TOOLS)
@@ -106,6 +106,11 @@ lint: $(TOOLS)
 
 lint-flake8: $(TOOLS)
 	$(VENV)/bin/python -m flake8
+
+# Forms of GitHub and the citation, against their schemas, which come with the tool.
+lint-forms: $(TOOLS)
+	@$(VENV)/bin/check-jsonschema --quiet --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/*.yml
+	@$(VENV)/bin/check-jsonschema --quiet --builtin-schema vendor.citation-file-format CITATION.cff
 
 lint-layers: $(TOOLS)
 	$(VENV)/bin/lint-imports --no-logo --cache-dir $(CACHE)/import_linter
@@ -196,7 +201,7 @@ bench-replay: $(TOOLS)
 bags: $(INSTALLED)
 	$(VENV)/bin/python bags/record.py
 
-# The pictures and the generated tables in README.md and docs/.
+# The pictures and the generated tables in README.md and docs/, and the outputs of the notebooks.
 docs: $(TOOLS)
 	$(VENV)/bin/python docs/figures/errata.py
 	$(VENV)/bin/python docs/figures/draw.py
@@ -206,6 +211,7 @@ docs: $(TOOLS)
 	$(VENV)/bin/python docs/figures/cranks.py
 	$(VENV)/bin/python docs/figures/tables.py
 	$(VENV)/bin/python demo/cueing.py --output docs/figures/motion_cueing.png
+	$(VENV)/bin/python -m jupyter execute --inplace examples/notebooks/*.ipynb
 
 # The pages as a site: docs/_build/html/index.html.
 docs-site: $(TOOLS)

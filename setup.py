@@ -50,7 +50,8 @@ extras_require = {
     'docs': [
         'docutils>=0.21',  # tex2mathml has as_block
         'furo>=2024.1.29',
-        'myst-parser>=3',  # for this docutils
+        'myst-nb>=1.1.1',  # for this docutils
+        'myst-parser>=3',  # likewise
         'numpydoc>=1.6',
         'sphinx>=7.3.7',  # for this docutils; 7.3.0 warns of any type of a setting
     ],
@@ -72,6 +73,7 @@ extras_require = {
     ],
     'usd': ['usd-core>=24.8'],
     'test': [
+        'check-jsonschema',
         'cmake',
         'colcon-common-extensions',
         'dask',
@@ -80,12 +82,14 @@ extras_require = {
         'flake8-import-order',
         'hypothesis',
         'import-linter',
+        'ipykernel',
         'jsonschema>=4',
         'matplotlib',
         'mcap',
         'mcap-ros2-support',
         'mujoco',
         'mypy',
+        'nbclient',
         'nvidia-cuda-nvrtc-cu12; sys_platform == "linux"',  # compiles kernels without a GPU
         'packaging',
         'pin',
@@ -230,6 +234,7 @@ setup(
         (f'{share}/config/controllers', sorted(glob('config/controllers/*.*'))),
         (f'{share}/deploy', sorted(glob('deploy/*'))),
         (f'{share}/examples', sorted(glob('examples/*.*'))),
+        (f'{share}/examples/notebooks', sorted(glob('examples/notebooks/*.*'))),
         # Not launch/*: after a launch file was compiled there is a folder __pycache__.
         (f'{share}/launch', sorted(glob('launch/*.launch.py'))),
         (f'{share}/security', sorted(glob('security/*'))),

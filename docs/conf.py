@@ -8,12 +8,14 @@ from __future__ import annotations
 import gc
 from pathlib import Path
 import re
+import shutil
 from typing import Any
 from xml.etree import ElementTree
 
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
+from sphinx.config import Config
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -25,12 +27,16 @@ author = 'The stewart_dynamics developers'
 copyright = f'2026, {author}'  # noqa: A001
 release = ElementTree.parse(ROOT / 'package.xml').getroot().findtext('version')
 
-extensions = ['myst_parser', 'numpydoc', 'sphinx.ext.autodoc']
+extensions = ['myst_nb', 'numpydoc', 'sphinx.ext.autodoc']
 exclude_patterns = ['_build', 'figures']
 
 myst_enable_extensions = ['dollarmath']
 # The anchors that GitHub gives headings, so that links work there as well.
 myst_heading_anchors = 4
+
+# Pages of notebooks show the outputs that are stored in them; test_notebooks.py executes them.
+nb_execution_mode = 'off'
+nb_merge_streams = True
 
 # Warnings are errors, and an unknown reference is a warning.
 nitpicky = True
@@ -92,7 +98,32 @@ def label_cells(app: Sphinx, doctree: nodes.document, docname: str) -> None:
                     cell[0].insert(0, nodes.inline('', f'{head}: ', classes=['label']))
 
 
+# Pages of files that stand elsewhere: written here for each build, and ignored by git.
+
+def write_pages(app: Sphinx, config: Config) -> None:
+    """Copy the notebooks to docs/notebooks/; write each release of CHANGELOG.rst to docs/releases/."""
+    notebooks, releases = (ROOT / 'docs' / name for name in ('notebooks', 'releases'))
+    for folder in (notebooks, releases):
+        shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(ROOT / 'examples' / 'notebooks', notebooks)
+    releases.mkdir()
+    _, *parts = re.split(r'^(\S.*)\n-+\n', (ROOT / 'CHANGELOG.rst').read_text(encoding='utf-8'),
+                         flags=re.MULTILINE)
+    pages = {title.split()[0].lower(): f'{title}\n{"=" * len(title)}\n{text}'
+             for title, text in zip(parts[::2], parts[1::2], strict=True)}
+    pages['index'] = '\n   '.join(['Releases\n========\n\n.. toctree::\n', *pages]) + '\n'
+    for name, text in pages.items():
+        (releases / f'{name}.rst').write_text(text, encoding='utf-8')
+
+
 # Links lead to the files that GitHub shows; on the site these are included in pages.
+_PAGES = {
+    '../CHANGELOG.rst': 'releases/index.rst', '../CONTRIBUTING.md': 'contributing.md',
+    '../README.md': 'index.md', '../SECURITY.md': 'security_policy.md',
+    '../benchmarks/README.md': 'performance.md', '../benchmarks/results/': 'results/',
+    '../examples/notebooks/': 'notebooks/',
+    '../security/README.md': 'security.md', '../../docs/': '../'}
+
 
 def lead_to_pages(*arguments: Any) -> None:
     """Replace links to files outside docs/ in a page, or in a file that it includes."""
@@ -100,14 +131,13 @@ def lead_to_pages(*arguments: Any) -> None:
     if (ROOT / 'docs' / arguments[1]).resolve().parent == ROOT:
         content[0] = re.sub(r'\]\((?!docs/|#|\w+:)', '](../', content[0])
         content[0] = content[0].replace('](docs/', '](')
-    content[0] = content[0].replace('](../CONTRIBUTING.md', '](contributing.md')
-    content[0] = re.sub(r'\]\(\.\./benchmarks/README\.md', '](performance.md', content[0])
-    content[0] = content[0].replace('](../benchmarks/results/', '](results/')
-    content[0] = re.sub(r'\]\(\.\./security/README\.md', '](security.md', content[0])
+    for file, page in _PAGES.items():
+        content[0] = content[0].replace(f']({file}', f']({page}')
 
 
 def setup(app: Sphinx) -> None:
     """Register the formulas and the rewriting of links."""
+    app.connect('config-inited', write_pages)
     app.connect('doctree-resolved', label_cells)
     app.connect('source-read', lead_to_pages)
     app.connect('include-read', lead_to_pages)

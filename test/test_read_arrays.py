@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 import subprocess
 import sys
@@ -74,17 +73,6 @@ def test_tables_have_the_numbers_of_the_arrays() -> None:
     np.testing.assert_array_equal(table['force_3'], result.forces[:, 2])
     table = found.to_dataframe()
     np.testing.assert_array_equal(table['alz'], found.motion.angular_acceleration[:, 2])
-
-
-def test_the_notebook_goes_from_a_bag_to_a_figure() -> None:
-    notebook = json.loads((ROOT / 'examples' / 'bag_to_figure.ipynb').read_text(encoding='utf-8'))
-    cells = [''.join(cell['source']) for cell in notebook['cells'] if cell['cell_type'] == 'code']
-    assert all(not cell['outputs'] for cell in notebook['cells'] if cell['cell_type'] == 'code')
-    code = '\n'.join([*cells, 'assert len(figure.axes) == 3 and figure.axes[2].lines'])
-    for folder in (ROOT, ROOT / 'examples'):
-        done = subprocess.run([sys.executable, '-c', code], cwd=folder, capture_output=True,
-                              text=True, check=False, env={'MPLBACKEND': 'Agg', 'PATH': ''})
-        assert done.returncode == 0, done.stderr
 
 
 def test_arrays_are_read_without_ros() -> None:

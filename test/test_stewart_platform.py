@@ -405,6 +405,8 @@ def test_results_are_drawn_where_matplotlib_is_installed(
         result.plot([0.0, 0.1])
     with snapshot.raises(MotionError):
         ON_EXAMPLE.inverse_dynamics(Motion(position[0], np.eye(3))).plot()
+    assert result.plot()._repr_png_().startswith(b'\x89PNG')  # what Jupyter shows
+    monkeypatch.delitem(sys.modules, 'stewart_dynamics.reporting.result_figures')
     monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
     with pytest.raises(ModuleNotFoundError, match='plot: matplotlib is not installed: pip'):
         result.plot()

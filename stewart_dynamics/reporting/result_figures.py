@@ -6,8 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from io import BytesIO
 
+try:
+    from matplotlib.figure import Figure
+except ImportError as exc:
+    raise ModuleNotFoundError(
+        'plot: matplotlib is not installed: pip install matplotlib') from exc
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -15,10 +20,17 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 _HEIGHT = 2.6  # of one plot [in]
+
+
+class NotebookFigure(Figure):
+    """A figure that Jupyter shows as a picture, also where pyplot is not imported."""
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture, as IPython asks for it."""
+        picture = BytesIO()
+        self.savefig(picture, format='png')
+        return picture.getvalue()
 
 
 def figure_of_legs(quantities: Mapping[str, Array], times: ArrayLike | None,
@@ -28,16 +40,11 @@ def figure_of_legs(quantities: Mapping[str, Array], times: ArrayLike | None,
 
     Arguments and errors are those of ``InverseDynamics.plot``.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as exc:
-        raise ModuleNotFoundError('plot: matplotlib is not installed: '
-                                  'pip install matplotlib') from exc
     shape = next(iter(quantities.values())).shape
     if len(shape) != 2:
         raise MotionError(f'plot: results of shape {shape[:-1]}: must be (N,)')
     across = np.arange(shape[0]) if times is None else as_array('times', times, shape[:1])
-    made = Figure(figsize=(8.0, 0.4 + _HEIGHT * len(quantities)), layout='constrained')
+    made = NotebookFigure(figsize=(8.0, 0.4 + _HEIGHT * len(quantities)), layout='constrained')
     every = made.subplots(len(quantities), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (title, values) in zip(every, quantities.items(), strict=True):
         lines = axes.plot(across, values)
