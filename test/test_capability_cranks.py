@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from cases import few
 from crank_machines import random_machine, random_state
 from crank_newton_euler import CrankHexapod, State
 from crank_platforms import base_of, motion_of, parameters_of
@@ -168,7 +169,7 @@ def wrong_travels(seed: int) -> tuple[list[str], list[str]]:
     return wrong, found.limit.tolist()
 
 
-@pytest.mark.parametrize('first', MACHINES[::10])
+@pytest.mark.parametrize('first', few(MACHINES[::10], 2))
 def test_travels_agree_with_a_dense_scan(first: int) -> None:
     ends: set[str] = set()
     for seed in range(first, first + 10):
@@ -392,7 +393,7 @@ def excess(machine: CrankHexapod, p: Parameters, pose: Pose, pivot: Array, point
     return largest
 
 
-@pytest.mark.parametrize('first', range(0, 30, 5))
+@pytest.mark.parametrize('first', few(range(0, 30, 5), 1))
 def test_boxes_agree_with_samples(first: int) -> None:
     answers = []
     for seed in range(first, first + 5):

@@ -13,6 +13,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from cases import few
 from crank_machines import random_machine
 from crank_newton_euler import CrankHexapod, inverse_dynamics, machine_of, State
 from crank_platforms import parameters_of, six
@@ -294,8 +295,7 @@ def test_the_motion_of_angles_is_the_motion_they_come_from() -> None:
     np.testing.assert_allclose(rows[:, 18:], truth.rows[:, 18:], atol=1e-5)
 
 
-@pytest.mark.parametrize('option', [
-    '--motor-torque', pytest.param('--motor-current', marks=pytest.mark.slow)])
+@pytest.mark.parametrize('option', few(['--motor-torque', '--motor-current'], 1))
 def test_torques_and_currents_of_motors_show_the_same(
         run: Callable[..., Any], option: str) -> None:
     p = GIVEN.replaced(DRIVES)
@@ -403,7 +403,7 @@ def test_a_parameter_that_a_lack_of_fit_hides_is_no_combination_by_itself() -> N
             each['coefficients'], each['parameters'], strict=True)) * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize('seed', [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))])
+@pytest.mark.parametrize('seed', few(range(3), 1))
 def test_intervals_contain_hexapods_that_are_drawn(seed: int) -> None:
     """See benchmarks/interval_coverage.py --legs crank for 200 of them."""
     found: Outcome = judged([recorded_of(drawn(seed, CRANKS), 'rich', seed, rate=RATE)],

@@ -16,6 +16,7 @@ import subprocess
 import sys
 from typing import Any
 
+from cases import few
 from checked_results import state_record
 from crank_machines import random_machine, random_state
 from crank_platforms import base_of, motion_of, parameters_of
@@ -602,8 +603,7 @@ def test_32_bit_targets_compile(exported: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif('gcc' not in COMPILERS, reason='needs gcc')
-@pytest.mark.parametrize('level', [
-    '-O0', *(pytest.param(level, marks=pytest.mark.slow) for level in ('-O2', '-O3'))])
+@pytest.mark.parametrize('level', few(['-O0', '-O2', '-O3'], 1))
 def test_stack_is_bounded_and_nothing_recurses(tmp_path: Path, level: str) -> None:
     """The deepest chain of calls, by gcc's call graph; it needs no globals and no allocation."""
     made = tmp_path / 'source.o'

@@ -37,6 +37,7 @@ import time
 from typing import Any
 import uuid
 
+from cases import few
 from distributed import Client, LocalCluster
 import messages
 import numpy as np
@@ -215,8 +216,7 @@ def check_only_the_long_one_failed(
 
 # On this computer
 
-@pytest.mark.parametrize('where', [
-    'processes', *(pytest.param(where, marks=pytest.mark.slow) for where in ('here', 'cluster'))])
+@pytest.mark.parametrize('where', few(['processes', 'here', 'cluster'], 1))
 def test_every_bag_is_replayed_once_with_its_progress(
         bags: Path, tmp_path: Path, where: str, request: pytest.FixtureRequest,
         monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
@@ -341,7 +341,7 @@ def test_a_bag_finished_by_the_same_run_is_not_replayed_again(short: Path, tmp_p
 
 
 @pytest.mark.parametrize('deaths', [1, 2])
-@pytest.mark.parametrize('where', ['processes', pytest.param('cluster', marks=pytest.mark.slow)])
+@pytest.mark.parametrize('where', few(['processes', 'cluster'], 1))
 def test_a_process_that_dies_costs_only_its_bag(
         bags: Path, tmp_path: Path, deaths: int, where: str, request: pytest.FixtureRequest,
         monkeypatch: pytest.MonkeyPatch) -> None:

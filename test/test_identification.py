@@ -12,6 +12,7 @@ import re
 import shutil
 from typing import Any, TYPE_CHECKING
 
+from cases import few
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -411,8 +412,7 @@ def test_losses_of_drives_are_no_mass_and_no_friction(
     assert values_of(result)['platform.mass'] == pytest.approx(180.0, rel=0.003)
 
 
-@pytest.mark.parametrize('frequency', [
-    0.2, *(pytest.param(each, marks=pytest.mark.slow) for each in (0.5, 1.0))])
+@pytest.mark.parametrize('frequency', few([0.2, 0.5, 1.0], 1))
 @pytest.mark.parametrize('factor', [1.0, -1.0])
 def test_opposite_efforts_in_heave_are_not_taken_for_a_delay(
         identified: Callable[..., Any], frequency: float, factor: float,

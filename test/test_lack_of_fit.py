@@ -9,6 +9,7 @@ from contextlib import closing
 from pathlib import Path
 import re
 
+from cases import few
 import estimate_cases
 from estimate_cases import (
     braked, drawn, FILE, identified, MOTIONS, recording, rich, SENSORS, stopping, Truth,
@@ -90,8 +91,7 @@ def test_a_wrong_model_is_noticed_and_its_cause_named(cause: str) -> None:
     np.testing.assert_allclose(np.diff(given)[:, 0], 2.0 * wide)
 
 
-@pytest.mark.parametrize('cause', [
-    SILENT[0], *(pytest.param(cause, marks=pytest.mark.slow) for cause in SILENT[1:])])
+@pytest.mark.parametrize('cause', few(SILENT, 1))
 def test_errors_that_the_file_allows_for_are_within_the_intervals(cause: str) -> None:
     case = CAUSES[cause][0](true_hexapod(1), rng(1001))
     found = identify(simulated(case, 1))

@@ -228,6 +228,7 @@ def test_pytest_starts_beside_the_plugins_of_launch(tmp_path: Path) -> None:
     call([sys.executable, '-m', 'pytest', '--markers'], ROOT, PYTHONPATH=paths)
 
 
+@pytest.mark.slow
 def test_wheel_has_entry_points_and_no_scripts(
         wheel: Path, distribution: importlib.metadata.Distribution) -> None:
     """The folder of scripts that setup.cfg gives colcon is not that of the wheel."""
@@ -241,6 +242,7 @@ def test_wheel_has_entry_points_and_no_scripts(
     assert not [name for name in names if name.startswith('test/')]
 
 
+@pytest.mark.slow
 def test_pip_puts_executables_on_the_path(wheel: Path, tmp_path: Path) -> None:
     """They land in bin/, beside Python, and the data in share/."""
     call([sys.executable, '-m', 'pip', 'install', '--no-deps', '--no-index', '--ignore-installed',

@@ -173,6 +173,7 @@ def curve_of(data: Any, plot: str, number: int, variant: int = 0) -> tuple[Array
 # ---- the file
 
 
+@pytest.mark.slow
 def test_a_million_setpoints_fit_into_ten_megabytes(tmp_path: Path) -> None:
     block = Given(np.arange(5000) * 1e-3, np.resize(trajectory('clear').motions, (5000, 24)))
     report = Report(PARAMETERS, measured=True)
