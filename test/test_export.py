@@ -200,7 +200,7 @@ def check_results(found: Any, expected: Array, codes: Any) -> None:
     assert np.array_equal(codes == SINGULAR, expected[:, CONDITION] >= 1e12)
 
 
-@pytest.mark.parametrize('seed', range(8))
+@pytest.mark.parametrize('seed', few(range(8), 2))
 def test_cranks_have_the_bits_of_the_library(library: ctypes.CDLL, seed: int) -> None:
     random = rng(seed)
     machine, count = random_machine(random), 40

@@ -54,7 +54,7 @@ def equal(one: Any, other: Any) -> bool:
 # ---- bits ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('moving', [False, True])
+@pytest.mark.parametrize('moving', [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize('kind', KINDS)
 def test_results_have_the_bits_of_the_library(kind: str, moving: bool) -> None:
     """Several platforms of few motions take the loops of the kernels, many motions the lanes."""

@@ -142,7 +142,7 @@ def parked(seconds: float, moving: Recorded) -> Recorded:
     return still._replace(positions=still.positions - moving.positions[0] + end)
 
 
-@pytest.mark.parametrize('pieces', [1, 3])
+@pytest.mark.parametrize('pieces', few([1, 3], 1))
 def test_short_recordings_are_not_tested(pieces: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wrong_models, 'SECONDS', 3.5 * pieces)  # 24 cut-off periods are left
     (whole,) = simulated(Case(true_hexapod(1)), 1)
@@ -157,7 +157,7 @@ def test_short_recordings_are_not_tested(pieces: int, monkeypatch: pytest.Monkey
         assert result_text(result).startswith('not tested for a lack of fit: what can be used')
 
 
-@pytest.mark.parametrize('delay', [0.0, 0.09])
+@pytest.mark.parametrize('delay', few([0.0, 0.09], 1))
 def test_pieces_at_rest_before_a_motion_are_no_lack_of_fit(
         delay: float, monkeypatch: pytest.MonkeyPatch) -> None:
     noise = NOISE._replace(delay=delay)

@@ -305,6 +305,7 @@ def test_achieved_poses_in_another_unit_are_named(
     assert notice.endswith(': likely another unit of lengths in m')
 
 
+@pytest.mark.slow
 def test_setpoints_and_achieved_poses_in_tables_share_a_clock(
         commanded: tuple[Array, Motion], tmp_path: Path) -> None:
     times, motion = commanded
