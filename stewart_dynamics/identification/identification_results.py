@@ -15,6 +15,8 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 import math
 from pathlib import Path
+import re
+import shlex
 import textwrap
 from typing import Any
 
@@ -219,7 +221,8 @@ def _notice(found: Identified, sure: bool) -> str:
             f'{"any of the possible causes" if lack.unexplained else "this"} would make: '
             f'{found.unknowns.names[asked[widest]]} is {ratios[widest]:.2g} times as wide, half '
             f'of all at most {np.median(ratios):.2g} times')
-    return f'the residuals are more than noise: {cause}; {changes}; next: {NEXT[lack.cause]}'
+    advice = NEXT[lack.cause].format(file=shlex.quote(found.parameters.source))
+    return f'the residuals are more than noise: {cause}; {changes}; next: {advice}'
 
 
 def _residuals(p: Parameters, residuals: Residuals) -> dict[str, Any]:
@@ -272,7 +275,9 @@ def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
 def result_text(result: Mapping[str, Any]) -> str:
     """Return identification.json as text, at most 100 columns wide except for long names."""
     lack = result['lack_of_fit']
-    notice = textwrap.wrap(f'LACK OF FIT: {lack["text"]}', 100) if lack else []
+    # A command that is advised has a line of its own, to be copied.
+    sentence, *command = re.split(': (?=stewart_)', f'LACK OF FIT: {lack["text"]}') if lack else ['']
+    notice = [*textwrap.wrap(sentence, 100), *(f'  {each}' for each in command)]
     if not result['tested_for_lack_of_fit']:
         notice = textwrap.wrap(NOT_TESTED, 100)
     lines = [*notice, *_headline(result), '', *table_lines(result['parameters'], 'identified'),

@@ -110,8 +110,9 @@ class LackOfFit(NamedTuple):
 
 # Kinds of numbers that may be farther from the file than their uncertainty allows.
 CONTRADICTED = 'tilt', 'reflected_mass', 'leg_mass', 'effort_gain'
-# Advice for each cause.
-_GEOMETRY = 'calibrate the geometry (stewart_calibrate)'
+# Advice for each cause; file: the parameter file.
+_GEOMETRY = ('calibrate the geometry, from poses that are chosen by: '
+             'stewart_calibrate --design 20 --params {file}')
 NEXT = {
     **{what: f'correct the file, or give a larger uncertainty.{what}' for what in CONTRADICTED},
     'effort_gain': 'check the scale of the efforts (load cells, torque constant, losses), or give '
@@ -124,8 +125,8 @@ NEXT = {
     'stribeck_friction': 'record a motion that is slow for a smaller part of its time',
     'load_friction': 'if efforts follow from motors, give drive.efficiency and --motor-torque',
     **{kind.zero_cause.what: _GEOMETRY for kind in KINDS}, 'joint': _GEOMETRY,
-    UNKNOWN: 'look at this part in the report, and compare with a recording of another motion '
-             '(--design --seed 1)'}
+    UNKNOWN: 'look at this part in the report, and compare with a recording of another motion: '
+             'stewart_identify --design --seed 1 --params {file}'}
 
 
 class _Explained(NamedTuple):

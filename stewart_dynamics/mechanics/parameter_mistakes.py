@@ -149,31 +149,6 @@ _BODY: Table[_Body] = First(
             f'{_SIZE}: in g, or the joints in cm?')))))
 
 
-class _Point(NamedTuple):
-    """A point of the platform frame."""
-
-    name: str  # of its parameter
-    point: Array  # (3,) [m]
-    middle: Array  # of the platform joints (3,) [m]
-    radius: float  # of these [m]
-    larger: float  # of both radii [m]
-
-    @property
-    def text(self) -> str:
-        """Return the point in words."""
-        return _listed(self.point)
-
-    @property
-    def away(self) -> float:
-        """Return its distance from the middle of the joints [m]."""
-        return float(np.linalg.norm(self.point - self.middle))
-
-
-_FAR_POINT: Table[_Point] = Hypothesis(
-    '{name}', lambda s: s.away - _FARTHEST_CENTER * s.larger,
-    f'{{text}} m is {{away:.3g}} m from the middle of the platform joints, {_SIZE}: in mm?')
-
-
 class _File:
     """A parameter file, and what hypotheses need of it, computed once."""
 
@@ -236,8 +211,11 @@ class _File:
 
     def far_point(self, name: str, point: Array) -> Iterator[PossibleError]:
         """Yield that a point of the platform frame is too far away for its unit."""
-        return find_errors(_FAR_POINT, _Point(
-            name, point, self.middle, self.platform, self.larger))
+        away = float(np.linalg.norm(point - self.middle))
+        if away > _FARTHEST_CENTER * self.larger:
+            yield PossibleError(name, (
+                f'{_listed(point)} m is {away:.3g} m from the middle of the platform joints, '
+                f'{_SIZE.format(radius=self.platform)}: in mm?'))
 
     @cached_property
     def has_wrong_size(self) -> bool:
@@ -463,9 +441,17 @@ class _Assembled(_File):
             return  # the angles at home are zero
         angles = JointAngles(self.p, given)(Motion.from_pose(home).rows[None])[0]
         for axes, (limit, where) in zip(AXES, ANGLES.items(), strict=True):
-            if axes in given:
-                yield from find_errors(_AXES, _Angles(axes, limit, self.leg, angles[where],
-                                                      self.six[limit]))
+            bounds, at_home = self.six[limit], angles[where]
+            leg = int(np.argmax(at_home - np.nan_to_num(bounds)))
+            if axes in given and at_home[leg] > _AWAY:
+                yield PossibleError(axes, (
+                    f'at home {self.leg[leg]} is {at_home[leg]:.3g} rad from it: does it point '
+                    'from the platform to the base, is the platform on the other side of the base '
+                    '(geometry.platform_side), or are the legs in another order?'))
+            elif axes in given and at_home[leg] > bounds[leg]:
+                yield PossibleError(limit, (
+                    f'{bounds[leg]:.3g} rad, but at home {self.leg[leg]} is {at_home[leg]:.3g} '
+                    f'rad from its axis in {axes}'))
 
     def singularity(self) -> Iterator[PossibleError]:
         """Yield that all poses that are tried, or home, are singular."""
@@ -502,56 +488,22 @@ class _Assembled(_File):
     def part_errors(self) -> Iterator[PossibleError]:
         """Yield errors in masses of the legs' parts."""
         for part, joint in (('cylinder', 'base'), ('piston', 'platform')):
-            of = self.p.legs.parts[part]
-            yield from find_errors(_CENTERS, _Center(f'legs.{part}', joint, of.center_of_mass,
-                                                     self.longest))
+            of, name = self.p.legs.parts[part], f'legs.{part}.center_of_mass'
+            # Behind the joint there may be a motor, but at most half a leg away from it.
+            outside = (of.center_of_mass > self.longest) | (
+                of.center_of_mass < -0.5 * self.longest)
+            if outside.any():
+                yield PossibleError(name, (
+                    f'{of.center_of_mass[np.argmax(outside)]:.3g} m from the {joint} joint, but '
+                    f'no leg is over {self.longest:.3g} m: in mm?'))
+            elif part == 'piston' and of.center_of_mass.min() < -_BEHIND * self.longest:
+                yield PossibleError(name, (
+                    f'{of.center_of_mass.min():.3g} m: behind the platform joint: a sign? It '
+                    'counts from this joint toward the base'))
             yield from find_errors(PART_ERRORS, Part(
                 f'legs.{part}', of.mass, of.inertia, np.full(6, self.longest)))
 
 
-class _Angles(NamedTuple):
-    """Angles of the legs from the axes of their joints at home."""
-
-    axes: str
-    limit: str
-    leg: Sequence[str]
-    angles: Array  # (6,) [rad]
-    bounds: Array  # (6,) [rad]; nan: not set
-
-    @property
-    def farthest(self) -> Array:
-        """Return the angle that is largest by its limit; nan for the others."""
-        beyond = self.angles - np.nan_to_num(self.bounds)
-        return np.where(np.arange(6) == np.argmax(beyond), self.angles, np.nan)
-
-
-_AXES: Table[_Angles] = First(
-    Hypothesis('{axes}', lambda a: a.farthest - _AWAY, (
-        'at home {leg} is {angles:.3g} rad from it: does it point from the platform to the base, '
-        'is the platform on the other side of the base (geometry.platform_side), or are the legs '
-        'in another order?')),
-    Hypothesis('{limit}', lambda a: a.farthest - a.bounds, (
-        '{bounds:.3g} rad, but at home {leg} is {angles:.3g} rad from its axis in {axes}')))
-
-
-class _Center(NamedTuple):
-    """Centers of mass of a part of each leg, from one of its joints."""
-
-    name: str
-    joint: str
-    center: Array  # (6,) [m]
-    longest: float  # leg [m]
-
-
-_CENTERS: Table[_Center] = First(
-    # Behind the joint there may be a motor, but at most half a leg away from it.
-    Hypothesis('{name}.center_of_mass', lambda c: (
-        (c.center > c.longest) | (c.center < -0.5 * c.longest)), (
-        '{center:.3g} m from the {joint} joint, but no leg is over {longest:.3g} m: in mm?')),
-    When(lambda c: c.joint == 'platform', Hypothesis(
-        '{name}.center_of_mass', lambda c: -_BEHIND * c.longest - c.center, (
-            '{center:.3g} m: behind the platform joint: a sign? It counts from this joint toward '
-            'the base'))))
 _At = Hypothesis[_Assembled]
 
 

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 import re
+import shlex
 import textwrap
 from typing import Any
 
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.program import NODE
 from stewart_dynamics.replay.statements import (
     at_time, INPUTS, JOINTS, LIMITS, LOADS, motion_statements, MOTOR_LIMITS, MOTORS, READING,
     SINGULARITY)
@@ -32,6 +34,10 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
     lines = [f'{summary["bag"]}:']
     if summary['measured']:
         lines += _measured_lines(summary['measured'], kind_in(summary['legs']))
+        if summary['measured']['setpoints_compared']:
+            lines += ['payload and friction that fit the measured '
+                      f'{parameters.leg_kind.effort.field}:',
+                      f'  {_identify_command(summary, parameters)}']
     if summary['response']:
         lines += _response_lines(summary['response'])
     lines += summary_lines(summary)
@@ -42,6 +48,18 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
         when = '' if each['first_at_s'] is None else at_time(each['first_at_s'], 3)
         lines.append(rejection.words(f'first{when}: {each["first"]}' if each['first'] else ''))
     return '\n'.join(lines)
+
+
+def _identify_command(summary: Mapping[str, Any], parameters: Parameters) -> str:
+    """Return the command that identifies payload and friction from the bag of a summary."""
+    inputs = summary['inputs']
+    words = ['stewart_identify', summary['bag'], '--params', parameters.source]
+    for option, value in (
+            ('--node', inputs['node'] if inputs['node'] != NODE else None),
+            ('--measured', inputs['measured'])):
+        words += [option, value] if value else []
+    return shlex.join([*words, *(option for option in ('--motor-torque', '--motor-current')
+                                 if inputs[option[2:].replace('-', '_')])])
 
 
 def summary_lines(summary: Mapping[str, Any]) -> list[str]:
@@ -100,9 +118,7 @@ def _measured_lines(measured: Mapping[str, Any], kind: LegKind) -> list[str]:
     decimals = decimals_of(kind.decimals, residuals.values())
     rms = ', '.join(f'{leg} {fixed(each, decimals)}' for leg, each in residuals.items())
     lines += [f'compared {measured["setpoints_compared"]} setpoints; measured minus computed '
-              f'{effort.name}, RMS [{effort.unit}]: {rms}',
-              'stewart_identify finds the payload and friction that fit the measured '
-              f'{effort.field}']
+              f'{effort.name}, RMS [{effort.unit}]: {rms}']
     contacts = measured['contacts']
     lines += [f'contact {_span(each["from_s"], each["to_s"])}: external force '
               f'({", ".join(fixed(part, 1) for part in each["force_n"])}) N'

@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from itertools import combinations
-import numpy as np
 
+import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.core.binding import function
