@@ -276,7 +276,8 @@ def result_text(result: Mapping[str, Any]) -> str:
     """Return identification.json as text, at most 100 columns wide except for long names."""
     lack = result['lack_of_fit']
     # A command that is advised has a line of its own, to be copied.
-    sentence, *command = re.split(': (?=stewart_)', f'LACK OF FIT: {lack["text"]}') if lack else ['']
+    sentence, *command = re.split(
+        ': (?=stewart_)', f'LACK OF FIT: {lack["text"]}') if lack else ('',)
     notice = [*textwrap.wrap(sentence, 100), *(f'  {each}' for each in command)]
     if not result['tested_for_lack_of_fit']:
         notice = textwrap.wrap(NOT_TESTED, 100)
