@@ -34,6 +34,7 @@ install_requires = [
     'jinja2>=3.1',  # the replay's pages
     'lz4>=4',
     'mcap>=1.2.1',
+    'msgspec>=0.18.6',  # records of results
     'numpy>=1.26',
     'orjson>=3.9',
     'plotly>=6',  # plotly.js in the report

@@ -17,6 +17,7 @@ import secrets
 import stat
 from typing import Any
 
+from msgspec import Struct, to_builtins
 from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.signals import signals_wait
 
@@ -204,8 +205,9 @@ def to_json(document: Any, indent: int | None = None) -> str:
     Raises ValueError: a number is not finite.
     """
     # Not orjson: it writes null for NaN, and takes no names that are not UTF-8.
-    return json.dumps(plain(document), indent=indent, separators=None if indent else (',', ':'),
-                      allow_nan=False, ensure_ascii=False)
+    return json.dumps(
+        to_builtins(plain(document)), indent=indent, allow_nan=False, ensure_ascii=False,
+        separators=None if indent else (',', ':'))
 
 
 def plain(document: Any) -> Any:
@@ -216,6 +218,10 @@ def plain(document: Any) -> Any:
     a template nor JSON takes all of numpy's scalars.
     """
     import numpy as np  # late, so that --help is fast
+
+    if isinstance(document, Struct):
+        return type(document)(**{name: plain(getattr(document, name))
+                                 for name in document.__struct_fields__})
 
     if isinstance(document, (np.generic, np.ndarray)):
         return document.tolist()

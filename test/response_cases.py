@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from msgspec import to_builtins
 import numpy as np
 from numpy.typing import NDArray
 from referees import rng
@@ -137,7 +138,7 @@ def judged(kind: str, axes: int, level: float, seed: int) -> Judged:
     commanded[:, moved], achieved[:, moved] = scale * x[begin:], scale * y[begin:]
     achieved += level * 0.01 * random.normal(size=achieved.shape) * ([SIZE] * 3 + [1.0] * 3)
     run = Run(times[begin:], commanded, achieved, np.zeros(len(commanded), dtype=bool))
-    return answered(axes_response(Runs([run], RATE, HIGHEST), SIZE), moved, drives)
+    return answered(to_builtins(axes_response(Runs([run], RATE, HIGHEST), SIZE)), moved, drives)
 
 
 def answered(found: dict[str, Any], moved: Sequence[int], drives: Sequence[Drive]) -> Judged:

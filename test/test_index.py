@@ -12,9 +12,11 @@ from pathlib import Path
 import re
 from typing import Any, TYPE_CHECKING
 
+from bag_summaries import bag_summary
 import pytest
 
 from stewart_dynamics.legs import TELESCOPIC
+from stewart_dynamics.replay.bag_summary import BagSummary
 from stewart_dynamics.replay.index import columns_of, row_of, write_fleet
 
 if TYPE_CHECKING:
@@ -36,8 +38,8 @@ NEAR = {'determinant_nearest_m3': 0.25, 'determinant_nearest_at_s': 1.0, 'crossi
         'warnings_from_to_s': [], 'warning_s': 0.0, 'unsolved': 0, 'suppressed': 0}
 
 
-def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
-    """Return the parts of a summary that go into the table; the peaks are forces [N]."""
+def summary(peaks: list[float | None], **changes: Any) -> BagSummary:
+    """Return a summary with these forces [N]."""
     legs = {f'leg_{n}': {
         'force_peak_n': peak, 'force_peak_at_s': n * 1.0,
         'force_margin_n': None if peak is None else 100.0 - abs(peak),
@@ -48,11 +50,8 @@ def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
         'clearance_min_m': None, 'clearance_min_at_s': None, 'clearance_margin_m': None,
         'force_rms_n': None if peak is None else 0.5 * abs(peak),
         'power_peak_w': None if peak is None else -peak} for n, peak in enumerate(peaks)}
-    return {'software': 'stewart_dynamics 9', 'complete': True,
-            'setpoints': POINTS, 'legs': legs, 'motors': None, 'limits': [],
-            'limits_not_checked': [], 'measured': None, 'missing': [], 'rejected': [],
-            'singularity': NEAR,
-            'base_wrench': {'force': {'peak_n': None}, 'moment': {'peak_n_m': None}}, **changes}
+    return bag_summary({'software': 'stewart_dynamics 9', 'setpoints': POINTS, 'legs': legs,
+                        'singularity': NEAR}, **changes)
 
 
 def exceeded(limit: str, leg: str) -> dict[str, Any]:
@@ -64,7 +63,7 @@ def rejected(*counts: int) -> list[dict[str, Any]]:
             for n, count in enumerate(counts)]
 
 
-def row(bag: str, code: int = 0, of: dict[str, Any] | None = None, error: str = '',
+def row(bag: str, code: int = 0, of: BagSummary | None = None, error: str = '',
         results: str | None = None) -> dict[str, Any]:
     return {**row_of(code, of, error), 'bag': bag, 'results': results}
 
@@ -139,7 +138,8 @@ def test_rejected_messages_are_a_reason(
 def test_a_row_has_the_result_of_the_comparison_with_measured_forces(tmp_path: Path) -> None:
     measured = {
         'setpoints_compared': 9, 'headline': 'they differ', 'residual_share': 0.25,
-        'contacts': {'count': 2, 'strongest': [{'from_s': 0.0}]},
+        'contacts': {'count': 2, 'strongest': [{
+            'from_s': 0.0, 'to_s': 1.0, 'axis': 'force_x', 'force_n': [], 'moment_n_m': []}]},
         'legs': {f'leg_{n}': {'residual_rms_n': 10.0 * n} for n in range(6)}}
     write_fleet(tmp_path, [row('a', 0, summary([1.0], measured=measured)), row('b')])
     cells, without = table(tmp_path)
@@ -149,7 +149,8 @@ def test_a_row_has_the_result_of_the_comparison_with_measured_forces(tmp_path: P
 
 
 def test_a_bag_without_numbers_has_empty_cells(tmp_path: Path) -> None:
-    nothing = summary([None] * 6, setpoints=UNANSWERED, singularity=dict.fromkeys(NEAR))
+    nothing = summary([None] * 6, setpoints=UNANSWERED, singularity={
+        key: None if isinstance(value, float) else value for key, value in NEAR.items()})
     write_fleet(tmp_path, [row('none', 0, nothing, results='none'), row('bad', 2, None, 'why')])
     none, bad = table(tmp_path)
     assert (none['force_worst_n'], none['force_worst_leg'], none['condition_max']) == ('',) * 3

@@ -10,6 +10,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from bag_summaries import bag_summary, motion_of
 import numpy as np
 import pytest
 from recorded import fourier
@@ -21,9 +22,10 @@ from stewart_dynamics.mechanics.drives.heat import temperature_rises
 from stewart_dynamics.mechanics.drives.motors import (
     BREAKAWAY_TORQUES, MOTORS, Motors, SPEEDS)
 from stewart_dynamics.mechanics.limits import OF_LEGS
+from stewart_dynamics.replay.bag_summary import MotorLoads
 from stewart_dynamics.replay.index import row_of, write_fleet
 from stewart_dynamics.replay.motor_charts import Deliverable, motor_charts, OperatingPoints
-from stewart_dynamics.replay.motor_loads import MARGIN, needed
+from stewart_dynamics.replay.motor_loads import MARGIN, needed_motor
 from stewart_dynamics.replay.statements import Card, cards, motion_statements
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
@@ -58,9 +60,8 @@ def summary_of(p: Parameters, motion: Motion, times: Array, edges: list[int],
         state = outputs.state
         summary.add(Answered(times[first:end], block, outputs, base(block),
                              powers_of(StewartPlatform(p), block, outputs)))
-    values = summary.values()
-    to_json(values)
-    return values
+    to_json(summary.values())
+    return motion_of(summary)
 
 
 def test_loads_are_those_of_the_motors_of_the_library() -> None:
@@ -117,7 +118,7 @@ def test_loads_are_those_of_the_motors_of_the_library() -> None:
         assert [each['setpoints'] for each in entries] == [
             count for count in exceeding.sum(axis=0).tolist() if count]
     assert {each['limit'] for each in found['limits']} > {'drive.torque_max', 'drive.speed_max'}
-    lines = [each.line for each in motion_statements(found)]
+    lines = [each.line for each in motion_statements(bag_summary(found))]
     assert any(line.startswith('drive.torque_continuous, exceeded by') for line in lines)
     assert any('motor needed: ' in line and 'margin of 20 %' in line for line in lines)
 
@@ -148,7 +149,7 @@ def test_the_card_of_the_motors_says_whether_their_limits_are_held() -> None:
     def of_limits(p: Parameters, **changes: Any) -> dict[str, Card]:
         found = summary_of(p.replaced({f'drive.{k}': v for k, v in changes.items()}), motion,
                            TIMES[:20], [])
-        return cards({**found, 'missing': [], 'rejected': [], 'measured': None})
+        return cards(bag_summary(found, parameters=p))
 
     def card(**changes: Any) -> Card:
         return of_limits(P, **changes)['motors']
@@ -220,7 +221,8 @@ def test_a_bound_far_above_all_loads_is_stated_and_does_not_set_the_scale(
                     'drive.torque_speed': None, 'drive.torque_continuous': bound})
     points = OperatingPoints()
     points.add(Motors.of_rows(rows_of(np.full((1, 6), 9.0), np.full((1, 6), -2.0))))
-    load = {'speed_mean_rad_s': 4.0, 'torque_rms_n_m': 1.0}
+    load = MotorLoads(**dict.fromkeys(MotorLoads.__struct_fields__))
+    load.speed_mean_rad_s, load.torque_rms_n_m = 4.0, 1.0
     charts = motor_charts(points, p, dict.fromkeys(p['joints'], load))
     for chart in charts.values():
         assert ('class="curve"' in chart) is drawn
@@ -236,16 +238,16 @@ def test_the_motor_needed_is_that_of_all_bags_but_those_near_a_singularity(tmp_p
     for n, (size, singular) in enumerate(((0.3, 0), (0.6, 0), (0.9, 1))):
         found = summary_of(P, fourier(3, size=size)(TIMES[:200]), TIMES[:200], [])
         found['singularity']['warnings'] = singular
-        found |= {'rejected': [], 'measured': None, 'missing': [], 'complete': True,
-                  'software': 'x'}
-        rows.append({**row_of(0, found, ''), 'bag': f'{n}', 'results': f'{n}'})
+        rows.append({**row_of(0, bag_summary(found), ''), 'bag': f'{n}', 'results': f'{n}'})
     rows.append({**row_of(2, None, 'bad'), 'bag': 'bad', 'results': None})
     write_fleet(tmp_path, rows)
-    largest = needed(rows[:2])
-    assert largest['torque_peak_n_m'] == pytest.approx(MARGIN * max(
+    largest = needed_motor((
+        row['torque_rms_n_m'], row['torque_peak_n_m'], row['speed_peak_rad_s'])
+        for row in rows[:2])
+    assert largest.torque_peak_n_m == pytest.approx(MARGIN * max(
         abs(row['torque_peak_n_m']) for row in rows[:2]))
     page = (tmp_path / 'index.html').read_text(encoding='utf-8')
-    assert f'"motor":"{largest["torque_continuous_n_m"]:.4g} N m continuous, ' in page
+    assert f'"motor":"{largest.torque_continuous_n_m:.4g} N m continuous, ' in page
     with (tmp_path / 'fleet.csv').open(encoding='utf-8', newline='') as file:
         cells = next(csv.DictReader(file))
     assert float(cells['bus_power_peak_w']) == rows[0]['bus_power_peak_w']

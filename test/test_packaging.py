@@ -40,7 +40,7 @@ KEYS = {
     'gymnasium': '', 'hypothesis': 'python3-hypothesis', 'jinja2': 'python3-jinja2',
     'jsonschema': 'python3-jsonschema', 'lz4': '',
     'matplotlib': 'python3-matplotlib', 'mcap': 'mcap-ros2-support',
-    'mcap_ros2': 'mcap-ros2-support', 'mujoco': 'python3-mujoco-pip',
+    'mcap_ros2': 'mcap-ros2-support', 'msgspec': '', 'mujoco': 'python3-mujoco-pip',
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
     'pandas': 'python3-pandas', 'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '',
     'pxr': '', 'pyarrow': '', 'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',

@@ -242,7 +242,7 @@ def test_a_bag_cut_by_twenty_bytes_is_read_to_its_end(kind: str, tmp_path: Path)
     assert found.missing
     replayed = replay_one(file, PARAMETERS, tmp_path / 'out', Options(report=False))
     assert replayed.code == PARTLY_READ
-    assert replayed.summary['setpoints']['answered'] == 60
+    assert replayed.summary.setpoints.answered == 60
 
 
 @pytest.mark.parametrize('kind', KINDS)

@@ -55,6 +55,7 @@ from stewart_dynamics.setpoints.input_messages import (
     ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
 from stewart_dynamics.setpoints.output_messages import output_types
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
+from stewart_dynamics.whole_file import to_json
 from test_recording import write_ros_1
 
 PROGRAM = 'stewart_replay'
@@ -356,8 +357,8 @@ def expected_of(name: str) -> tuple[list[int], Counter[tuple[str, str]]]:
 
 
 def rejections(result: Replayed) -> dict[tuple[str, str], int]:
-    return {(each['topic'], each['reason']): each['count']
-            for each in result.summary['rejected']}
+    return {(each.topic, each.reason): each.count
+            for each in result.summary.rejected}
 
 
 def test_the_flaws_are_counted_as_they_are_in_the_bag(tmp_path: Path) -> None:
@@ -392,7 +393,7 @@ def test_setpoints_incomplete_at_the_end_are_counted(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(10)[:-2] + [(POSE, RECORDED + SECOND, b'\0\1')])
     result = replay(bag, PARAMETERS, tmp_path / 'out')
     assert rejections(result) == {(POSE, NOT_JOINED): 1, (POSE, MALFORMED): 1}
-    assert result.summary['setpoints']['answered'] == 9
+    assert result.summary.setpoints.answered == 9
 
 
 # Other bags
@@ -903,10 +904,10 @@ def test_the_library_raises_what_the_program_prints(tmp_path: Path, snapshot: Sn
         replay(ROOT / 'bags' / 'clear', PARAMETERS, tmp_path / 'there')
     result = replay(ROOT / 'bags' / 'clear', PARAMETERS, tmp_path / 'out')
     assert (result.bag, result.code) == (ROOT / 'bags' / 'clear', DONE)
-    assert result.summary['complete']
-    assert not result.summary['limit_met']
+    assert result.summary.complete
+    assert not result.summary.limit_met
     assert not rejections(result)
-    assert summary_of(tmp_path / 'out') == result.summary
+    assert summary_of(tmp_path / 'out') == json.loads(to_json(result.summary))
 
 
 def test_joint_angles_clearance_and_joint_forces_are_in_the_results_where_they_have_limits(

@@ -18,7 +18,9 @@ import sys
 import time
 from typing import Any, TYPE_CHECKING
 
+from bag_summaries import bag_summary
 from checked_results import part_of
+from msgspec.structs import replace
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -26,16 +28,15 @@ from snapshot import Snapshot
 
 from stewart_dynamics import Motion, Parameters, StewartError, StewartPlatform
 from stewart_dynamics.colors import LEG_COLORS, ROLES
-from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.rows import BASE, NO_BASE
 from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.replay.bag_report import Report, share_plotly
+from stewart_dynamics.replay.bag_summary import BagSummary, Inputs, Rejected
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
-from stewart_dynamics.replay.summary_text import measured_headline
 from stewart_dynamics.reporting.pages import (
     decimals, digits, number, plotly_script, thousands)
 from stewart_dynamics.setpoints.base_wrench_step import BaseWrench
@@ -75,18 +76,17 @@ class Given:
             part_of(self.outputs, part),
             self.base_wrenches[part], self.powers[part], self.breakdown[part])
 
-    def summary(self, **changes: Any) -> dict[str, Any]:
+    def summary(self, **changes: Any) -> BagSummary:
         """Return what summary.json would hold."""
         summary = Summary(self.parameters)
         summary.add(self.answered())
-        return {
+        return replace(summary.values(), **{
             'version': 1, 'software': 'stewart_dynamics 0.1.0', 'bag': 'bags/example', 'run': '',
             'complete': True, 'missing': [], 'notices': [],
-            'inputs': {'node': '/stewart_dynamics', 'topics': {'setpoint/pose': '/a/pose'},
-                       'differentiated_cutoff_hz': None, 'measured': None},
-            'rejected': [], 'measured': None, **summary.values(),
+            'inputs': Inputs('/stewart_dynamics', {'setpoint/pose': '/a/pose'}),
+            'rejected': [],
             'parameters': {name: value.ravel().tolist() if isinstance(value, np.ndarray) else value
-                           for name, value in self.parameters.items()}, **changes}
+                           for name, value in self.parameters.items()}, **changes})
 
     def report(self, measured: bool = False) -> Report:
         report = Report(self.parameters, measured)
@@ -94,7 +94,7 @@ class Given:
             report.add(self.answered())
         return report
 
-    def write(self, path: Path, **changes: Any) -> dict[str, Any]:
+    def write(self, path: Path, **changes: Any) -> BagSummary:
         summary = self.summary(**changes)
         self.report().write(path, summary)
         return summary
@@ -141,9 +141,7 @@ def write_measured(given: Given, path: Path, pushed: slice = slice(200, 260)) ->
             comparison.add_setpoints(given.seconds, given.setpoints, given.outputs),
             comparison.finish()):
         report.add_measured(*compared)
-    values = comparison.values()
-    report.write(path, given.summary(measured={
-        'headline': measured_headline(values, TELESCOPIC), **values}))
+    report.write(path, given.summary(measured=comparison.values()))
 
 
 def text_of(path: Path) -> str:
@@ -208,11 +206,12 @@ def test_plots_contain_the_samples_and_every_peak(tmp_path: Path) -> None:
             at, values = curve_of(data, plot, n)
             assert np.array_equal(at, given.seconds), plot
             assert np.array_equal(values, column.astype(np.float32)), plot
-    for n, leg in enumerate(summary['legs'].values()):
-        for plot, key in (('force', 'force_peak_n'), ('powers', 'power_peak_w'),
-                          ('rate', 'rate_peak_m_s')):
+    for n, leg in enumerate(summary.legs.values()):
+        for plot, peak in (('force', leg.effort_peak), ('powers', leg.power_peak_w),
+                           ('rate', leg.rate_peak)):
+            assert peak is not None
             _, values = curve_of(data, plot, n)
-            assert np.abs(values).max() == abs(np.float32(leg[key]))
+            assert np.abs(values).max() == abs(np.float32(peak))
         # a fixed base is no source
         parts = sum(curve_of(data, 'force_breakdown', 1 + c, n)[1]
                     for c in range(len(SOURCES) - 1))
@@ -300,10 +299,8 @@ def test_names_are_text_and_never_markup(tmp_path: Path) -> None:
             strict=True):
         trajectory('clear', PARAMETERS.replaced({'joints': list(joints)})).write(
             path, bag=bag, notices=[other], complete=False, missing=[one], run=other,
-            rejected=[{'topic': one, 'reason': other, 'count': 2, 'first': third,
-                       'first_at_s': 1.0}],
-            inputs={'node': '/n', 'topics': {'setpoint/pose': one},
-                    'differentiated_cutoff_hz': 5.0, 'measured': None})
+            rejected=[Rejected(one, other, 2, third, 1.0)],
+            inputs=Inputs('/n', {'setpoint/pose': one}, differentiated_cutoff_hz=5.0))
     hostile, harmless = (_Elements(path.read_text(encoding='utf-8')) for path in paths)
     assert hostile.names == harmless.names
     assert hostile.attributes == harmless.attributes
@@ -319,8 +316,8 @@ def test_the_report_shows_what_is_wrong_with_a_bag(tmp_path: Path) -> None:
     trajectory('singular').write(
         tmp_path / 'report.html', complete=False, missing=['chunk 3: its CRC is wrong'],
         notices=['the bag has no checksums'], rejected=[
-            {'topic': 'setpoint/pose', 'reason': reason, 'count': count, 'first': first,
-             'first_at_s': seconds} for reason, count, first, seconds in (
+            Rejected('setpoint/pose', reason, count, first, seconds)
+            for reason, count, first, seconds in (
                 ('not finite', 1234, 'nan', 0.25),
                 ('same stamp twice', 1, 'stamp 1700000000500000000 ns', 0.5),
                 ('older', 1, 'stamp 1700000000500000000 ns is 0.1 s older than the last used',
@@ -397,7 +394,7 @@ def test_missing_plotly_is_reported_in_one_line(
     plotly_script.cache_clear()
     path = tmp_path / 'report.html'
     with snapshot.raises(StewartError) as caught:
-        Report(PARAMETERS).write(path, {})
+        Report(PARAMETERS).write(path, bag_summary())
     assert '\n' not in str(caught.value)
     assert not path.exists()
 

@@ -14,9 +14,13 @@ import statistics
 import tracemalloc
 from typing import Any
 
+from bag_summaries import bag_summary, motion_of
 from checked_results import part_of
 from hypothesis import given
 from hypothesis import strategies as st
+import jsonschema
+from msgspec import ValidationError
+from msgspec.structs import replace
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -28,6 +32,8 @@ from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, TIME, UNSOLVABLE_CONDITION
+from stewart_dynamics.records import record_of
+from stewart_dynamics.replay.bag_summary import BagSummary
 from stewart_dynamics.replay.residuals import AXES
 from stewart_dynamics.replay.statements import cards
 from stewart_dynamics.replay.summary import Answered, Summary
@@ -149,9 +155,9 @@ def table_of(samples: Samples, parameters: Parameters) -> str:
 
 def values(many: int, **given: Any) -> dict[str, Any]:
     """Return what the summary of such samples has."""
-    found = Samples(many, **given).summary(hexapod()).values()
-    to_json(found)
-    return found
+    found = Samples(many, **given).summary(hexapod())
+    to_json(found.values())
+    return motion_of(found)
 
 
 def singularity(many: int, **given: Any) -> dict[str, Any]:
@@ -382,7 +388,7 @@ def assert_same(found: Any, truth: Any, at: str = '') -> None:
 @given(st.integers(0, 10 ** 6), st.integers(1, 50))
 def test_the_summary_agrees_with_its_definitions(seed: int, many: int) -> None:
     samples, parameters = random_samples(seed, many), hexapod(**LIMITS)
-    found = samples.summary(parameters).values()
+    found = motion_of(samples.summary(parameters))
     assert_same(json.loads(to_json(found)), json.loads(to_json(plain(parameters, samples))))
 
 
@@ -393,11 +399,11 @@ def test_any_split_gives_the_same_and_can_be_read_before_the_end(
     samples, parameters = random_samples(seed, many), hexapod(**LIMITS)
     whole, split = samples.summary(parameters), samples.summary(parameters, edges)
     for _ in range(2):
-        assert_same(split.values(), whole.values())
+        assert_same(motion_of(split), motion_of(whole))
     early = Summary(parameters)
     for part, end in zip(samples.parts(parameters, edges), [*edges, many], strict=True):
         early.add(part)
-        assert early.values()['setpoints']['answered'] == end
+        assert early.values().setpoints.answered == end
 
 
 def test_a_long_motion_is_the_same_in_blocks_of_any_size() -> None:
@@ -410,7 +416,7 @@ def test_a_long_motion_is_the_same_in_blocks_of_any_size() -> None:
     assert expected['singularity']['crossings'] > len(crossings) == LISTED
     assert expected['singularity']['warnings'] > LISTED
     for size in (1, 7, 999, 1000, 1001, 2500):
-        found = samples.summary(parameters, range(size, 3000, size)).values()
+        found = motion_of(samples.summary(parameters, range(size, 3000, size)))
         assert_same(json.loads(to_json(found)), json.loads(to_json(expected)))
 
 
@@ -446,7 +452,7 @@ def test_every_key_is_documented() -> None:
 
     samples = random_samples(1, 50)
     parameters = hexapod(**LIMITS, **{'base.source': 'imu'})
-    found = keys(samples.summary(parameters).values())
+    found = keys(motion_of(samples.summary(parameters)))
     for leg in parameters['joints']:
         found = {key.replace(f'legs.{leg}.', 'legs.NAME.').replace(
             f'force_breakdown.{leg}.', 'force_breakdown.NAME.') for key in found}
@@ -457,14 +463,32 @@ def test_every_key_is_documented() -> None:
     assert loads == {f'base_wrench.{kind}{axis}.{key}' for kind, unit in (
         ('force', 'n'), ('moment', 'n_m')) for axis in ('', '_x', '_y', '_z') for key in (
         f'rms_{unit}', f'mean_{unit}', f'peak_{unit}', 'peak_at_s')}
-    found -= loads
+    found = {re.sub(r'\.(force|moment)(_.)?\.', lambda name: f'.{name[1].upper()}.', key)
+             if key in loads else key for key in found}
     text = (ROOT / 'docs' / 'summary.md').read_text(encoding='utf-8')
     documented = set(re.findall(r'^\| `([^`]+)` \|', text, flags=re.MULTILINE))
     assert found <= documented
-    parts = ('setpoints.', 'legs.', 'limits[]', 'singularity.', 'force_breakdown.')
+    parts = ('setpoints.', 'legs.', 'limits[]', 'singularity.', 'force_breakdown.',
+             'base_wrench.')
     assert {key for key in documented if key.startswith(parts)} == found - {
         'limit_met', 'limits_not_checked', 'motors', 'quasi_static'}
     assert set(SOURCES) <= documented
+
+
+@pytest.mark.parametrize('file', ['platform', 'crank_platform'])
+def test_a_summary_follows_its_schema_and_is_read_from_its_document(file: str) -> None:
+    parameters = Parameters.from_yaml(ROOT / 'config' / f'{file}.yaml')
+    summary = replace(Summary(parameters).values(), parameters=parameters.plain())
+    document = json.loads(to_json(summary))
+    schema = json.loads((ROOT / 'config' / 'summary.schema.json').read_text(encoding='utf-8'))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    check = jsonschema.Draft202012Validator(schema)
+    check.validate(document)
+    assert to_json(record_of(BagSummary, document, parameters.leg_kind)) == to_json(summary)
+    document['setpoints']['answered'] = 'all'
+    assert not check.is_valid(document)
+    with pytest.raises(ValidationError, match='answered'):
+        record_of(BagSummary, document, parameters.leg_kind)
 
 
 # Energy
@@ -473,7 +497,7 @@ def test_energy_of_a_leg_that_drives_and_brakes() -> None:
     time = np.linspace(0.0, 2.0 * math.pi, 10001)
     samples = Samples(10001, seconds=time, demanded=100.0 * np.sin(time)[:, None],
                       rates=0.5 * np.cos(time)[:, None])
-    leg = samples.summary(hexapod()).values()['legs']['b']
+    leg = motion_of(samples.summary(hexapod()))['legs']['b']
     # P = 25 sin 2t: two humps of 25 each way
     assert leg['energy_driving_j'] == pytest.approx(50.0, rel=1e-6)
     assert leg['energy_braking_j'] == pytest.approx(50.0, rel=1e-6)
@@ -489,8 +513,8 @@ def test_slow_setpoints_are_no_gaps() -> None:
 
 def test_without_a_setpoint_there_is_nothing() -> None:
     summary = Summary(hexapod(**LIMITS))
-    found = summary.values()
-    to_json(found)
+    to_json(summary.values())
+    found = motion_of(summary)
     assert found['setpoints'] == {
         'answered': 0, 'first_stamp_ns': None, 'last_stamp_ns': None, 'duration_s': 0.0,
         'gaps': 0, 'gaps_s': 0.0, 'restarts': 0, 'base_unknown': 0,
@@ -499,15 +523,15 @@ def test_without_a_setpoint_there_is_nothing() -> None:
     assert set(found['legs']['front left'].values()) == {None}
     assert (found['limits'], found['force_breakdown'], found['limit_met']) == ([], None, False)
     assert summary_lines(summary.values()) == ['no setpoint could be answered']
-    assert_same(Samples(0).summary(hexapod()).values(), Summary(hexapod()).values())
+    assert_same(motion_of(Samples(0).summary(hexapod())), motion_of(Summary(hexapod())))
 
 
 def test_there_are_no_margins_without_limits() -> None:
     leg = values(2)['legs']['b']
     assert leg['length_margin_m'] is leg['rate_margin_m_s'] is leg['force_margin_n'] is None
     only = Samples(2, lengths=[[1.0] * 6, [1.25] * 6]).summary(
-        hexapod(**{'limits.length_max': 1.5})).values()['legs']['b']
-    assert only['length_margin_m'] == 0.25
+        hexapod(**{'limits.length_max': 1.5})).values().legs['b']
+    assert only.position_margin == 0.25
 
 
 def test_numbers_that_are_not_finite_are_null() -> None:
@@ -623,11 +647,11 @@ def test_statements_for_the_terminal(
 
 def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
     samples = Samples(2, det=[1.0, -1.0], warnings=1.0, demanded=6.0)
-    found = {**samples.summary(hexapod(**FORCE_LIMIT)).values(), 'missing': [], 'measured': None,
+    found = {**motion_of(samples.summary(hexapod(**FORCE_LIMIT))),
              'rejected': [{'topic': f'{n}', 'count': n, 'reason': 'late'} for n in range(1, 6)]}
 
     def shown(**changes: Any) -> dict[str, tuple[str, str]]:
-        return {name: card[:2] for name, card in cards({**found, **changes}).items()}
+        return {name: card[:2] for name, card in cards(bag_summary(found, **changes)).items()}
 
     assert shown() == {
         'reading': ('warn', 'Not all messages could be used'),
@@ -640,12 +664,13 @@ def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
     assert shown(rejected=[])['reading'] == ('good', 'The whole bag was read')
     assert shown(limits=[])['limits'] == ('good', 'All limits are held')
     assert shown(limits=[], limits_not_checked=['limits.velocity_max'])['limits'][0] == 'warn'
-    empty = {**Summary(hexapod()).values(), 'missing': [], 'rejected': [], 'measured': None}
+    empty = Summary(hexapod()).values()
     assert [card.level for card in cards(empty).values()] == ['good', *['none'] * 5]
-    lines = [each.line for each in cards(found)['reading'].statements]
+    lines = [each.line for each in cards(bag_summary(found))['reading'].statements]
     assert lines == ['2 setpoints in 1.00 s', '5: 5 rejected: late', '4: 4 rejected: late',
                      '3: 3 rejected: late', '3 not used for other reasons']
-    jumps = {**found, 'setpoints': {**found['setpoints'], 'jumps': 2, 'jumps_first_at_s': 0.5}}
+    jumps = bag_summary(found, setpoints={
+        **found['setpoints'], 'jumps': 2, 'jumps_first_at_s': 0.5})
     assert ('2 jumps, first at t = 0.50 s: the legs cannot follow within limits.velocity_max'
             in [each.line for each in cards(jumps)['limits'].statements])
 
@@ -659,8 +684,7 @@ def test_limits_are_held_by_demands_which_measured_efforts_may_contradict(
         mistake: dict[str, str] | None, level: str, line: str) -> None:
     measured = {'setpoints_compared': 2, 'contacts': {'count': 0}, 'residual_share': None,
                 'headline': '', 'likely_mistake': mistake}
-    found = {**Samples(2).summary(hexapod(**FORCE_LIMIT)).values(), 'missing': [], 'rejected': [],
-             'measured': measured}
+    found = bag_summary(motion_of(Samples(2).summary(hexapod(**FORCE_LIMIT))), measured=measured)
     card = cards(found)['limits']
     assert (card.level, [each.line for each in card.statements]) == (level, [line])
     assert cards(found)['measured'].level == level
@@ -668,9 +692,8 @@ def test_limits_are_held_by_demands_which_measured_efforts_may_contradict(
 
 
 def test_dropped_messages_are_not_called_rejected() -> None:
-    samples = Samples(2)
-    found = {**samples.summary(hexapod()).values(), 'missing': [], 'measured': None,
-             'rejected': [{'topic': 'setpoint', 'count': 49, 'reason': NOT_JOINED}]}
+    found = bag_summary(motion_of(Samples(2).summary(hexapod())), rejected=[
+        {'topic': 'setpoint', 'count': 49, 'reason': NOT_JOINED}])
     assert ('setpoint: 49 dropped: not all topics had its stamp'
             in [each.line for each in cards(found)['reading'].statements])
 
@@ -683,7 +706,8 @@ def test_large_numbers_of_the_table_have_a_space_before_them() -> None:
 
 def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     samples = Samples(3, rates=0.0, breakdown=1.0)
-    found = samples.summary(hexapod(**LIMITS), quasi_static=True).values()
+    summary = samples.summary(hexapod(**LIMITS), quasi_static=True)
+    found = motion_of(summary)
     leg = found['legs']['b']
     assert {key for key, value in leg.items() if value is None} == {
         'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
@@ -694,10 +718,10 @@ def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     # a limit that cannot be checked is not held
     assert (found['limits'], found['limits_not_checked']) == ([], ['limits.velocity_max'])
     assert found['limit_met']
-    text = '\n'.join(summary_lines(found))
+    text = '\n'.join(summary_lines(summary.values()))
     assert 'limits.velocity_max could not be checked' in text
     assert 'within all limits' not in text
-    assert not samples.summary(hexapod(**FORCE_LIMIT), quasi_static=True).values()['limit_met']
+    assert not samples.summary(hexapod(**FORCE_LIMIT), quasi_static=True).values().limit_met
 
 
 def test_setpoints_without_a_known_base_are_counted_and_have_no_forces() -> None:
@@ -707,10 +731,10 @@ def test_setpoints_without_a_known_base_are_counted_and_have_no_forces() -> None
     limited = hexapod(**FORCE_LIMIT)
     for parameters, checked in ((limited, False), (hexapod(), True)):
         found = samples.summary(parameters).values()
-        assert found['setpoints']['base_unknown'] == 2
-        assert found['setpoints']['base_unknown_first_at_s'] == 1.0
-        assert (found['singularity']['unsolved'], found['singularity']['suppressed']) == (0, 0)
-        assert bool(found['limits_not_checked']) is found['limit_met'] is not checked
+        assert found.setpoints.base_unknown == 2
+        assert found.setpoints.base_unknown_first_at_s == 1.0
+        assert (found.singularity.unsolved, found.singularity.suppressed) == (0, 0)
+        assert bool(found.limits_not_checked) is found.limit_met is not checked
         text = '\n'.join(summary_lines(found))
         assert ("the base's motion is not known in 2 setpoints, first at t = 1.00 s: they have no "
                 'forces') in text
@@ -726,4 +750,4 @@ def test_a_limit_is_exceeded_only_above_its_tolerance() -> None:
     for factor, exceeded in ((1.0 + 5e-10, False), (1.0 + 5e-9, True)):
         found = Samples(1, demanded=bound * factor).summary(
             hexapod(**{'limits.force_max': bound})).values()
-        assert bool(found['limits']) is exceeded
+        assert bool(found.limits) is exceeded

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from legs_of_all_kinds import efforts_of, KINDS, random_hexapod
+from msgspec import to_builtins
 import numpy as np
 import pytest
 from referees import ROOT
@@ -141,14 +142,14 @@ def test_exceeding_hexapods_are_counted(kind: str) -> None:
     limit = float(np.quantile(np.abs(efforts).max(axis=(0, 2)), 0.97))
     p = p.replaced({p.leg_kind.effort_limit: limit})
     found, bands = loads(p, motion.rows, 200)
-    values = found.values()
+    values = to_builtins(found.values())
     counted = {each['limit']: each for each in values['limits']}
     assert counted[p.leg_kind.effort_limit]['hexapods'] == 6
     assert counted[p.leg_kind.effort_limit]['share'] == 0.03
     low, _, high = np.percentile(efforts, [2.5, 50.0, 97.5], axis=1)
     np.testing.assert_array_equal(bands, np.concatenate([low, high], axis=1))
     other, others = loads(p, motion.rows, 200, parts=7)
-    assert other.values() == values
+    assert to_builtins(other.values()) == values
     assert np.array_equal(others, bands)
 
 
@@ -160,13 +161,13 @@ def test_limits_of_motors_are_counted() -> None:
     rows = np.zeros((3, 24))
     rows[:, :12] = home.rows
     found, _ = loads(p, rows, 100)
-    counted = {each['limit']: each['hexapods'] for each in found.values()['limits']}
+    counted = {each.limit: each.hexapods for each in found.values().limits}
     hexapods = Hexapods(p, 100, uncertainty=0, device='cpu')
     torques = np.abs(hexapods.inverse_dynamics(rows[0]).forces) * 0.01 / (2.0 * np.pi)
     assert counted['drive.torque_max'] == int((torques > 1.0).any(axis=1).sum())
     p = p.replaced({'drive.torque_max': float(np.median(torques.max(axis=1)))})
     found, _ = loads(p, rows, 100)
-    counted = {each['limit']: each['hexapods'] for each in found.values()['limits']}
+    counted = {each.limit: each.hexapods for each in found.values().limits}
     assert counted['drive.torque_max'] == 50
 
 

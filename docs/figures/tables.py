@@ -13,13 +13,15 @@ two comments of its page.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, get_args, get_origin
 
+from msgspec.json import schema_components
+from msgspec.structs import fields
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.legs import CRANK, KINDS
 from stewart_dynamics.node.dynamics_node import BACKLOG
@@ -29,7 +31,9 @@ from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.structure import LEG_FIELDS, LISTS, PLATFORM_FIELDS
 from stewart_dynamics.parameters.table import BY_IMU, FIXED, Parameters
 from stewart_dynamics.questions.editor_schema import SCHEMA, schema_text
+from stewart_dynamics.records import of_kind, Record
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.replay.bag_summary import BagSummary
 from stewart_dynamics.setpoints.consistency import (
     DELAY, DELAY_IN_SAMPLES, PERIOD, PERSISTENT, SHARE, SLOWEST, TICK, TOLERANCE, WEAKEST)
 from stewart_dynamics.setpoints.input_stream import WAITING
@@ -39,6 +43,7 @@ import yaml
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 SCHEMA_FILE = ROOT / 'config' / SCHEMA
+SUMMARY_SCHEMA = ROOT / 'config' / 'summary.schema.json'
 CONTROLLER_PARAMETERS = (ROOT / 'ros2_control' / 'stewart_dynamics_controller' / 'src'
                          / 'stewart_dynamics_controller_parameters.yaml')
 HEAD = '| name | type | unit | default | meaning |\n| --- | --- | --- | --- | --- |\n'
@@ -77,6 +82,16 @@ CONTROLLER_NAMES = ('joints', 'base_frame', *(
     'drive.rated_torque', 'drive.screw_rotation', 'drive.screw_hand', 'singularity.action',
     'limits.action', 'base.source', 'base.timeout', 'base.imu.position', 'base.imu.orientation',
     'base.imu.cutoff')
+
+# Keys of summary.json by the sections of its page.
+_SUMMARY = {
+    'the run': ('version', 'software', 'bag', 'run', 'complete', 'missing', 'notices', 'inputs',
+                'rejected', 'quasi_static', 'limit_met', 'mistakes', 'parameters', 'fingerprint'),
+    'the setpoints': ('setpoints',), 'the legs': ('legs',), 'the motors': ('motors',),
+    'the response': ('response',), 'the limits': ('limits', 'limits_not_checked'),
+    'the singularity': ('singularity',), 'the force breakdown': ('force_breakdown',),
+    'the base wrench': ('base_wrench',), 'the uncertainty': ('uncertainty',),
+    'the measured efforts': ('measured',)}
 
 # Those that are set first; legs.* stands for the two parts of a leg.
 FIRST = ('joints', 'geometry.base_joints', 'geometry.platform_joints', 'platform.mass',
@@ -351,6 +366,67 @@ def figures_of(results: Sequence[Measured]) -> str:
         for what, words, page, cells in results)])
 
 
+def summary_schema() -> str:
+    """Return the JSON schema of summary.json, of hexapods with each kind of legs."""
+    kinds, records = schema_components(
+        [of_kind(BagSummary, kind) for kind in KINDS], ref_template='#/$defs/{name}')
+    return json.dumps({'anyOf': kinds, '$defs': records}, indent=1) + '\n'
+
+
+def summary_keys(*names: str) -> str:
+    """Return the table of keys of summary.json, with the keys in them."""
+    listed = {each.name: each for each in fields(of_kind(BagSummary, KINDS[0]))}
+    return '\n'.join(['| key | type | meaning |', '| --- | --- | --- |', *(
+        row for name in names for row in _key_rows(name, listed[name].type))])
+
+
+def _key_rows(key: str, kind: Any) -> Iterator[str]:
+    """Yield the row of a key, unless it has no meaning of its own, and those of the keys in it."""
+    meaning = ''
+    if get_origin(kind) is Annotated:
+        kind, meta = get_args(kind)
+        meaning = meta.description
+    inner, place, names = kind, key, iter(('NAME', 'SOURCE'))
+    while get_origin(inner) in (dict, list) or type(None) in get_args(inner):
+        if get_origin(inner) is list:
+            place += '[]'
+        elif get_origin(inner) is dict:
+            place += f'.{next(names)}'
+        inner = get_args(inner)[-1 if get_origin(inner) is dict else 0]
+    of_record = _is_record(inner)
+    if meaning or not of_record:
+        yield f'| `{key}` | {_type_words(kind)} | {meaning} |'
+    listed: set[str] = set()
+    for each in fields(inner) if of_record else ():
+        # Keys with the same keys in them stand once, by the name of their record.
+        together = _is_record(each.type) and sum(
+            other.type is each.type for other in fields(inner)) > 1
+        name = (each.type.__name__.removesuffix('Response').upper() if together
+                else each.encode_name)
+        if name not in listed:
+            yield from _key_rows(f'{place}.{name}', each.type)
+        listed.add(name)
+
+
+def _is_record(kind: Any) -> bool:
+    return isinstance(kind, type) and get_origin(kind) is None and issubclass(kind, Record)
+
+
+def _type_words(kind: Any) -> str:
+    """Return the type of a key in words."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _type_words(arguments[0])
+    if type(None) in arguments:
+        return f'{_type_words(arguments[0])} or null' if len(arguments) == 2 else 'value'
+    if origin is dict:
+        return f'name: {_type_words(arguments[1])}'
+    if origin is list:
+        return f'list of {_type_words(arguments[0])}s'.replace('texts', 'text')
+    return {bool: 'flag', int: 'integer', float: 'number', str: 'text', tuple: 'pair'}.get(
+        origin or kind, 'group')
+
+
 def pages() -> dict[Path, dict[str, str]]:
     """Return of each page with generated tables their names and texts."""
     figures, on_a_ship, known = (json.loads((HERE / f'{name}.json').read_text(encoding='utf-8'))
@@ -378,6 +454,8 @@ def pages() -> dict[Path, dict[str, str]]:
             'parameters of cranks': rows({
                 name: parameter for name, parameter in Parameters.table.items()
                 if name.startswith(CRANK.own)})},
+        ROOT / 'docs' / 'summary.md': {
+            f'keys of {group}': summary_keys(*names) for group, names in _SUMMARY.items()},
         ROOT / 'docs' / 'simulator.md': {
             'errors in the loop': loop(figures), 'errors on a ship': ship(on_a_ship)},
         ROOT / 'docs' / 'identify_from_bags.md': {
@@ -405,7 +483,8 @@ def main() -> None:
         print(f'{page.relative_to(ROOT)}: {", ".join(tables)}')
     CONTROLLER_PARAMETERS.write_text(controller_parameters(), encoding='utf-8')
     SCHEMA_FILE.write_text(schema_text(), encoding='utf-8')
-    for path in (CONTROLLER_PARAMETERS, SCHEMA_FILE):
+    SUMMARY_SCHEMA.write_text(summary_schema(), encoding='utf-8')
+    for path in (CONTROLLER_PARAMETERS, SCHEMA_FILE, SUMMARY_SCHEMA):
         print(path.relative_to(ROOT))
 
 

@@ -39,8 +39,8 @@ from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.least_squares import Identifiability, identifiability
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import SOFTWARE
+from stewart_dynamics.records import key_of
 from stewart_dynamics.replay.statements import plural
-from stewart_dynamics.replay.summary import key_of
 from stewart_dynamics.reporting.estimates import (
     combined, estimate, IDENTIFIED, justified, NOT_IDENTIFIABLE, not_identifiable_lines,
     page_values, table_lines, WITHOUT_VALUE)

@@ -18,6 +18,7 @@ import itertools
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import asdict
 import numpy as np
 
 from stewart_dynamics.arrays import Array, RPM, SECOND
@@ -33,11 +34,11 @@ from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, PARTS_OF_WRENCH,
     POSE, POSITION, ROTATION)
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
+from stewart_dynamics.replay.bag_summary import BagSummary, LegLoads, margin_key, Rejected
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import NEEDS
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
-from stewart_dynamics.replay.summary import (
-    Answered, key_of, kind_in, LegKeys, margin_key, unit_key)
+from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
     base64_of, decimals_of, link, link_to_other, page, plotly_script)
@@ -47,7 +48,7 @@ from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE,
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.response.recorded_response import Followed
 from stewart_dynamics.response.response_charts import bode_charts, legs_chart, zoom_charts
-from stewart_dynamics.response.response_measures import bandwidth
+from stewart_dynamics.response.response_measures import bandwidths
 from stewart_dynamics.setpoints.rejections import stamp_of
 from stewart_dynamics.whole_file import FilesOfFolder, write_files
 
@@ -141,39 +142,40 @@ class Report:
             'measured': measured, 'computed': computed, 'residual': measured - computed,
             'external_force': wrench[:, :3], 'external_moment': wrench[:, 3:]})
 
-    def write(self, path: Path, summary: Mapping[str, Any], plotly: Path | None = None,
+    def write(self, path: Path, summary: BagSummary, plotly: Path | None = None,
               followed: Followed | None = None, command: str = '') -> None:
         """
-        Write the report, from summary.json; a file that exists is overwritten.
+        Write the report; a file that exists is overwritten.
 
         ``plotly`` is the file of plotly.js that several reports share; by default it is in the
         report. ``command`` rates the motion. Raises StewartError if plotly is not installed.
         """
         script = plotly_script() if plotly is None else ''
-        known = not summary['quasi_static']
+        known = not summary.quasi_static
         text = page(
             FOLDER, 'report', [script] if script else [], plotly is not None, True, s=summary,
             p=self._parameters, legs=list(self._legs),
-            name=Path(summary['bag']).name or summary['bag'], plotly=script, command=command,
+            name=Path(summary.bag).name or summary.bag, plotly=script, command=command,
             plotly_file=None if plotly is None else link(path, plotly),
             datasheet=link_to_other(
                 path, [Path(DATASHEET_PAGE), Path(DATASHEETS, DATASHEET_PAGE)], DATASHEET,
-                summary['parameters']),
+                summary.parameters),
             data=self._data(summary), sources=sources_of(self._parameters),
             cards=cards(summary), margins=smallest_margins(summary),
             margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
-            date=date(summary['setpoints']['first_stamp_ns']),
+            date=date(summary.setpoints.first_stamp_ns),
             quantities={name: limit.quantity for name, limit in LIMITS.items()},
             units={name: self._parameters.unit_of(name) or '' for name in PARAMETERS},
             most_times=_MOST_TIMES, needs=NEEDS, rpm=RPM, parts=PARTS_OF_WRENCH,
-            kind=self._kind, **_decimals(self._kind, summary['legs']),
-            wrench_decimals={part: decimals_of(self._kind.decimals, [
-                summary['base_wrench'][part][f'peak_{unit_key(unit)}']])
-                for part, unit in PARTS_OF_WRENCH.items()},
-            keys=LegKeys.of(self._kind), key_of=key_of, unit_key=unit_key,
-            percent=PERCENT, bandwidth=bandwidth, **_response_charts(followed),
-            charts=motor_charts(self._operating, self._parameters, summary['motors']['legs'])
-            if self._operating and known else {})
+            kind=self._kind, **_decimals(self._kind, summary.legs),
+            wrench_decimals={part: decimals_of(
+                self._kind.decimals, [getattr(summary.base_wrench, part).peak])
+                for part in PARTS_OF_WRENCH},
+            base_wrench=asdict(summary.base_wrench),
+            external_wrench=asdict(summary.measured.external_wrench) if summary.measured else {},
+            percent=PERCENT, bandwidths=bandwidths, **_response_charts(followed),
+            charts=motor_charts(self._operating, self._parameters, summary.motors.legs)
+            if self._operating and summary.motors and known else {})
         write_files({path: text})
 
     def _continued(self, angles: Array) -> Array:
@@ -184,11 +186,11 @@ class Report:
         self._angles = continued[-1:]
         return continued
 
-    def _data(self, summary: Mapping[str, Any]) -> dict[str, Any]:
+    def _data(self, summary: BagSummary) -> dict[str, Any]:
         times, frames = self._frames.chosen()
-        singularity = summary['singularity']
+        singularity = summary.singularity
         p = self._parameters
-        known = not summary['quasi_static']
+        known = not summary.quasi_static
         curves = _lines(self._curves)
         plots = [] if self._first is None else [
             *motion_plots(p, self._places, known, self._first.tolist()),
@@ -202,9 +204,9 @@ class Report:
             shown = measured_plots(p, {
                 name: slice(len(curves) + at.start, len(curves) + at.stop)
                 for name, at in self._places_compared.items()})
-            measured = summary['measured']
+            measured = summary.measured
             plots += [plot for plot in shown if not plot.key.startswith('external')
-                      or measured is None or measured['external_wrench_given']]
+                      or measured is None or measured.external_wrench_given]
             curves += _lines(self._compared)
         return {
             'samples': self._curves.samples,
@@ -220,21 +222,21 @@ class Report:
             'platformJoints': p.geometry.platform_joints,
             'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8'),
                        'places': self._frame},
-            'warnings': singularity['warnings_from_to_s'],
-            'crossings': singularity['crossings_at_s'],
-            'contacts': [[each['from_s'], each['to_s']] for each in (
-                summary['measured']['contacts']['strongest'] if summary['measured'] else ())],
+            'warnings': singularity.warnings_from_to_s,
+            'crossings': singularity.crossings_at_s,
+            'contacts': [[each.from_s, each.to_s] for each in (
+                summary.measured.contacts.strongest if summary.measured else ())],
             'curves': [_packed(*each) for each in curves],
             'plots': [plot.plain() for plot in plots],
         }
 
 
-def _decimals(kind: LegKind, legs: Mapping[str, Mapping[str, float | None]]) -> dict[str, int]:
+def _decimals(kind: LegKind, legs: Mapping[str, LegLoads]) -> dict[str, int]:
     """Return the decimals of efforts, powers and energies in the tables."""
-    keys = {'effort': LegKeys.of(kind).effort_peak, 'power': 'power_peak_w',
-            'energy': 'energy_driving_j'}
-    return {f'{name}_decimals': decimals_of(kind.decimals, [leg[key] for leg in legs.values()])
-            for name, key in keys.items()}
+    names = {'effort': 'effort_peak', 'power': 'power_peak_w', 'energy': 'energy_driving_j'}
+    return {f'{which}_decimals': decimals_of(
+        kind.decimals, [getattr(leg, name) for leg in legs.values()])
+        for which, name in names.items()}
 
 
 def _response_charts(followed: Followed | None) -> dict[str, Any]:
@@ -272,9 +274,9 @@ def share_plotly(folder: Path) -> Path:
 
 # -- tables ---------------------------------------------------------------------------------------
 
-def rejections(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+def rejections(summary: BagSummary) -> list[tuple[Rejected, str]]:
     """Return the rejected messages, with details that do not repeat the stamp."""
-    return [{**each, 'details': stamp_of(each['first'])[1]} for each in summary['rejected']]
+    return [(each, stamp_of(each.first)[1]) for each in summary.rejected]
 
 
 def margin_columns(parameters: Parameters) -> list[tuple[Quantity, str, list[str]]]:
@@ -291,12 +293,12 @@ def margin_columns(parameters: Parameters) -> list[tuple[Quantity, str, list[str
     return [(quantity, margin_key(quantity), names) for quantity, names in limits.items()]
 
 
-def smallest_margins(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+def smallest_margins(summary: BagSummary) -> list[dict[str, Any]]:
     """Return the smallest margins of all quantities with a limit, each with its leg."""
     found = []
-    names = limits_of_kind(kind_in(summary['legs'])).legs
+    names = limits_of_kind(summary.kind).legs
     for quantity in dict.fromkeys(LIMITS[limit].quantity for limit in names):
-        if margins := values_of(summary['legs'], margin_key(quantity)):
+        if margins := values_of(summary.legs, margin_key(quantity)):
             value, joint = min(margins, key=FIRST)
             found.append({'name': quantity.name, 'value': value, 'unit': quantity.unit,
                           'leg': joint})

@@ -11,15 +11,17 @@ import json
 from pathlib import Path
 import re
 import time
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from stewart_dynamics.bags.find import OUTPUT_BAG, RESULT
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import BAD_INPUT, partly_read, unexpected
+from stewart_dynamics.records import record_of
+from stewart_dynamics.replay.bag_summary import BagSummary, VERSION
 from stewart_dynamics.replay.index import Cell, row_of
 from stewart_dynamics.replay.legs_table import kind_of_table
-from stewart_dynamics.replay.one_bag import fingerprint, replay, VERSION
+from stewart_dynamics.replay.one_bag import fingerprint, replay
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.summary_text import summary_text
 from stewart_dynamics.reporting.results_folder import REPORT_PAGE
@@ -84,7 +86,7 @@ def replay_task(task: Task, progress: Callable[[int, int], None]) -> Ended:
 def finished(task: Task) -> Ended | None:
     """Return the outcome of a bag that a process of this run finished before it died."""
     summary = _summary_of(task)
-    return _outcome(task, summary) if summary and summary['run'] == task.options.run else None
+    return _outcome(task, summary) if summary and summary.run == task.options.run else None
 
 
 def kept(task: Task) -> Ended | None:
@@ -95,23 +97,24 @@ def kept(task: Task) -> Ended | None:
     if summary is None or not all((task.folder / name).exists() for name in files):
         return None
     made_of = fingerprint(task.bag, task.parameters, task.options)
-    if not made_of or summary['fingerprint'] != made_of:
+    if not made_of or summary.fingerprint != made_of:
         return None
     return _outcome(task, summary)._replace(kept=True)
 
 
-def _summary_of(task: Task) -> dict[str, Any] | None:
+def _summary_of(task: Task) -> BagSummary | None:
     """Return the content of summary.json; None if this version has not written one."""
     try:
-        summary = json.loads((task.folder / RESULT).read_text(encoding='utf-8'))
-        return summary if summary['version'] == VERSION and 'fingerprint' in summary else None
-    except (OSError, ValueError, TypeError, KeyError):
+        text = (task.folder / RESULT).read_text(encoding='utf-8')
+        summary = record_of(BagSummary, json.loads(text), task.parameters.leg_kind)
+        return summary if summary.version == VERSION and summary.fingerprint else None
+    except (OSError, ValueError):
         return None
 
 
-def _outcome(task: Task, summary: dict[str, Any]) -> Ended:
+def _outcome(task: Task, summary: BagSummary) -> Ended:
     code = code_of(summary)
-    missing = [' '.join(what.split()) for what in summary['missing']]
+    missing = [' '.join(what.split()) for what in summary.missing]
     return Ended(task.bag, task.folder, code, row_of(code, summary, '; '.join(missing)),
                  summary_text(summary, task.parameters),
                  partly_read(task.bag, missing) if missing else '')

@@ -21,11 +21,13 @@ from stewart_dynamics.legs import KINDS
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.limits import LIMITS, limits_of_kind
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
+from stewart_dynamics.records import key_of
+from stewart_dynamics.replay.bag_summary import BagSummary, margin_key
 from stewart_dynamics.replay.legs_table import harmless
-from stewart_dynamics.replay.motor_loads import needed
+from stewart_dynamics.replay.motor_loads import needed_motor
 from stewart_dynamics.replay.replay_options import LIMIT_MET
-from stewart_dynamics.replay.statements import MEASURED, MISSING, needed_words, statements
-from stewart_dynamics.replay.summary import key_of, kind_in, LegKeys, margin_key
+from stewart_dynamics.replay.statements import (
+    MEASURED, MISSING, needed_words, statements, values_of)
 from stewart_dynamics.reporting.pages import page
 from stewart_dynamics.reporting.results_folder import REPORT_PAGE
 from stewart_dynamics.whole_file import FilesOfFolder
@@ -52,7 +54,7 @@ class Column(NamedTuple):
     """
     A column: its key in fleet.csv, its title on the page, and its unit.
 
-    ``of`` returns the cell from the content of summary.json; None: not from there.
+    ``of`` returns the cell from the summary of a bag; None: not from there.
     ``size``: the page sorts these numbers by magnitude. ``optional``: the page shows the column
     only if a bag has a value.
     """
@@ -60,42 +62,41 @@ class Column(NamedTuple):
     key: str
     head: str
     unit: str = ''
-    of: Callable[[dict[str, Any]], Cell] | None = None
+    of: Callable[[BagSummary], Cell] | None = None
     number: bool = True
     size: bool = False
     optional: bool = False
 
 
-def _value(*keys: str) -> Callable[[dict[str, Any]], Cell]:
-    """Return a function for the value under these keys; None if one of them leads to none."""
-    def of(summary: dict[str, Any]) -> Cell:
+def _value(path: str) -> Callable[[BagSummary], Cell]:
+    """Return a function for the value at a path of keys; None if one of them leads to none."""
+    def of(summary: BagSummary) -> Cell:
         found: Any = summary
-        for key in keys:
-            found = None if found is None else found[key]
+        for key in path.split('.'):
+            found = None if found is None else found.under(key)
         cell: Cell = found
         return cell
 
     return of
 
 
-def _of_legs(key: str, choose: Callable[..., Any], part: str = '',
-             ) -> Callable[[dict[str, Any]], Cell]:
+def _of_legs(key: str, choose: Callable[..., Cell], part: str = '',
+             ) -> Callable[[BagSummary], Cell]:
     """Return a function that chooses among a value of each leg, in a part of the summary."""
-    def of(summary: dict[str, Any]) -> Cell:
-        legs = ((summary[part] or {'legs': {}}) if part else summary)['legs'].values()
-        cell: Cell = choose((leg[key] for leg in legs if leg[key] is not None), default=None)
-        return cell
+    def of(summary: BagSummary) -> Cell:
+        group = summary.under(part) if part else summary
+        legs = group.legs if group else {}
+        return choose((value for value, _ in values_of(legs, key)), default=None)
 
     return of
 
 
-def _of_worst_effort(keys: LegKeys, what: int) -> Callable[[dict[str, Any]], Cell]:
+def _of_worst_effort(what: int) -> Callable[[BagSummary], Cell]:
     """Return a function for the largest effort: 0 its value, 1 its leg, 2 its time."""
-    def of(summary: dict[str, Any]) -> Cell:
-        peaks = [(leg[keys.effort_peak], name, leg[keys.effort_at])
-                 for name, leg in summary['legs'].items() if leg[keys.effort_peak] is not None]
-        cell: Cell = max(peaks, key=lambda peak: abs(peak[0]))[what] if peaks else None
-        return cell
+    def of(summary: BagSummary) -> Cell:
+        peaks = [(leg.effort_peak, name, leg.effort_peak_at)
+                 for name, leg in summary.legs.items() if leg.effort_peak is not None]
+        return max(peaks, key=lambda peak: abs(peak[0]))[what] if peaks else None
 
     return of
 
@@ -103,42 +104,42 @@ def _of_worst_effort(keys: LegKeys, what: int) -> Callable[[dict[str, Any]], Cel
 _largest = partial(max, key=abs)
 
 
-def _exceeded(summary: dict[str, Any]) -> str:
+def _exceeded(summary: BagSummary) -> str:
     legs: dict[str, list[str]] = {}
-    for each in summary['limits']:
-        legs.setdefault(each['limit'].removeprefix('limits.'), []).append(each['leg'])
+    for each in summary.limits:
+        legs.setdefault(each.limit.removeprefix('limits.'), []).append(each.leg)
     return '; '.join(f'{limit}: {", ".join(of)}' for limit, of in legs.items())
 
 
-def _rejected(summary: dict[str, Any]) -> int:
-    return sum(each['count'] for each in summary['rejected'])
+def _rejected(summary: BagSummary) -> int:
+    return sum(each.count for each in summary.rejected)
 
 
 @cache
 def columns_of(kind: LegKind) -> tuple[Column, ...]:
     """Return the columns of bags of hexapods with a kind of legs."""
-    keys, limits, name, unit = (
-        LegKeys.of(kind), limits_of_kind(kind), kind.effort.name, kind.effort.unit)
+    limits, name, unit = limits_of_kind(kind), kind.effort.name, kind.effort.unit
     residual, of_motors = key_of('residual_rms', unit), _prefix_of_motors(kind)
+    effort_rms = key_of(f'{name}_rms', unit)
     return (
         Column('bag', 'bag', number=False),
         Column('code', ''),
         Column('result', 'result', number=False),
         Column('reason', 'reason', number=False),
         Column('complete', '', '', _value('complete'), number=False),
-        Column('setpoints', 'setpoints', '', _value('setpoints', 'answered')),
-        Column('duration_s', 'duration', 's', _value('setpoints', 'duration_s')),
-        Column(key_of(f'{name}_worst', unit), f'worst {name}', unit, _of_worst_effort(keys, 0),
+        Column('setpoints', 'setpoints', '', _value('setpoints.answered')),
+        Column('duration_s', 'duration', 's', _value('setpoints.duration_s')),
+        Column(key_of(f'{name}_worst', unit), f'worst {name}', unit, _of_worst_effort(0),
                size=True),
-        Column(f'{name}_worst_leg', 'of leg', '', _of_worst_effort(keys, 1), number=False),
-        Column(f'{name}_worst_at_s', 'at', 's', _of_worst_effort(keys, 2)),
+        Column(f'{name}_worst_leg', 'of leg', '', _of_worst_effort(1), number=False),
+        Column(f'{name}_worst_at_s', 'at', 's', _of_worst_effort(2)),
         *(Column(margin_key(quantity), f'{quantity.name} margin', quantity.unit,
                  _of_legs(margin_key(quantity), min), optional=not LIMITS[limit].usual)
           for limit in (*limits.loads, kind.position_limits[1], *limits.rates, *(
               each for each in limits.poses if each not in kind.position_limits))
           for quantity in [LIMITS[limit].quantity]),
         Column('limits_exceeded', 'limits exceeded', '', _exceeded, number=False),
-        Column(keys.effort_rms, f'RMS {name}', unit, _of_legs(keys.effort_rms, max)),
+        Column(effort_rms, f'RMS {name}', unit, _of_legs(effort_rms, max)),
         Column('power_peak_w', 'peak power', 'W', _of_legs('power_peak_w', _largest), size=True),
         *(Column(of_motors + key, head, unit, _of_legs(
             key, min if 'margin' in key else _largest, 'motors'),
@@ -150,22 +151,22 @@ def columns_of(kind: LegKind) -> tuple[Column, ...]:
             ('torque_continuous_margin_n_m', 'continuous torque margin', 'N m'),
             ('speed_margin_rad_s', 'speed margin', 'rad/s'),
             ('temperature_rise_max_k', 'temperature rise of windings', 'K'))),
-        *(Column(f'bus_{key}', head, unit, _value('motors', 'bus', key), optional=True)
+        *(Column(f'bus_{key}', head, unit, _value(f'motors.bus.{key}'), optional=True)
           for key, head, unit in (
             ('power_peak_w', 'bus power', 'W'),
             ('regenerated_peak_w', 'power flowing back', 'W'),
             ('energy_per_cycle_j', 'energy of a cycle', 'J'))),
         Column('determinant_nearest_m3', 'det(J) nearest 0', 'm³',
-               _value('singularity', 'determinant_nearest_m3'), size=True),
-        Column('crossings', 'crossings', '', _value('singularity', 'crossings')),
-        Column('condition_max', 'condition number', 'max', _value('singularity', 'condition_max')),
-        Column('warnings', 'warnings', '', _value('singularity', 'warnings')),
+               _value('singularity.determinant_nearest_m3'), size=True),
+        Column('crossings', 'crossings', '', _value('singularity.crossings')),
+        Column('condition_max', 'condition number', 'max', _value('singularity.condition_max')),
+        Column('warnings', 'warnings', '', _value('singularity.warnings')),
         Column('rejected', 'rejected', '', _rejected),
         Column(residual, 'residual RMS', unit, _of_legs(residual, max, 'measured'), optional=True),
         Column('residual_share', 'residual share', '',
-               _value('measured', 'residual_share'), optional=True),
-        Column('contacts', 'contacts', '', _value('measured', 'contacts', 'count'), optional=True),
-        Column('measured', 'measured', '', _value('measured', 'headline'), number=False,
+               _value('measured.residual_share'), optional=True),
+        Column('contacts', 'contacts', '', _value('measured.contacts.count'), optional=True),
+        Column('measured', 'measured', '', _value('measured.headline'), number=False,
                optional=True),
         Column('results', '', number=False),
     )
@@ -183,28 +184,28 @@ def _kind_of(rows: Iterable[Row]) -> LegKind:
     return next(kinds, KINDS[0])
 
 
-def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, Cell]:
+def row_of(code: int, summary: BagSummary | None, error: str) -> dict[str, Cell]:
     """
     Return a bag's cells except its path and the folder of its results.
 
-    They are those of summary.json, or of a bag that failed if it is None. The error is the reason
+    They are those of its summary, or of a bag that failed if it is None. The error is the reason
     why the bag failed or was read in part.
     """
     cells: dict[str, Cell] = {'code': code, 'result': RESULTS[code], 'reason': error}
     if summary is not None:
-        cells['software'] = summary['software']
+        cells['software'] = summary.software
         cells['reason'] = '; '.join([*([error] if error else []), *_reasons(summary)])
-        answered = summary['setpoints']['answered']
+        answered = summary.setpoints.answered
         if not answered:
             cells['result'] = NOTHING_ANSWERED
         elif code == DONE and _rejected(summary) > _REJECTED_SHARE * answered:
             cells['result'] = REJECTED
         cells.update({column.key: column.of(summary)
-                      for column in columns_of(kind_in(summary['legs'])) if column.of})
+                      for column in columns_of(summary.kind) if column.of})
     return cells
 
 
-def _reasons(summary: dict[str, Any]) -> list[str]:
+def _reasons(summary: BagSummary) -> list[str]:
     """Return the warnings about a bag that was replayed; the unread parts are in the error."""
     return [each.line for each in statements(summary)
             if each.level in ('warn', 'bad') and each.topic not in (MEASURED, MISSING)]
@@ -260,9 +261,9 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
     shown = [column for column in columns_of(_kind_of(rows)) if column.head and not (
         column.optional and all(row.get(column.key) is None for row in rows))]
     prefix = _prefix_of_motors(_kind_of(rows))
-    loads = [{key.removeprefix(prefix): cell for key, cell in row.items()
-              if key.startswith(prefix)} for row in rows
-             if f'{prefix}torque_peak_n_m' in row and not row['warnings']]
+    loads: list[Any] = [
+        [row[prefix + key] for key in ('torque_rms_n_m', 'torque_peak_n_m', 'speed_peak_rad_s')]
+        for row in rows if f'{prefix}torque_peak_n_m' in row and not row['warnings']]
     fleet = {
         'software': next((row['software'] for row in rows if 'software' in row), ''),
         'columns': [{'key': column.key, 'head': column.head, 'unit': column.unit,
@@ -270,7 +271,7 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
         # The colour of a row.
         'codes': [LIMIT_MET if row['result'] == REJECTED else row['code'] for row in rows],
         'severity': SEVERITY,
-        'motor': needed_words(needed(loads)),
+        'motor': needed_words(needed_motor(loads)),
         'links': [_link(output, row) for row in rows],
         'rows': [[_shown(row.get(column.key)) for column in shown] for row in rows],
     }

@@ -18,7 +18,8 @@ from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.replay.summary import Answered, key_of
+from stewart_dynamics.records import key_of
+from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.reporting.results_folder import LEGS_CSV, LEGS_PARQUET
 
 # Beginnings of text that spreadsheet programs execute.

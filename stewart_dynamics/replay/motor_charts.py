@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 import math
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.mechanics.drives.motor_limits import largest_speeds, largest_torques
 from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.parameters.table import Parameters, six_of
+from stewart_dynamics.replay.bag_summary import MotorLoads
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
 
 # Cells of each motor: magnitude of the speed, torque.
@@ -113,11 +113,11 @@ class Deliverable:
 
 
 def motor_charts(points: OperatingPoints, parameters: Parameters,
-                 loads: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+                 loads: Mapping[str, MotorLoads]) -> dict[str, str]:
     """
     Return a picture (SVG) of each motor, all with the same axes.
 
-    The loads are ``motors.legs`` of summary.json.
+    The loads are those of the motor of each leg.
     """
     limits = [Deliverable(parameters, leg) for leg in range(6)]
     continuous = parameters.drive.torque_continuous
@@ -136,7 +136,7 @@ def _scale(used: float, bounds: Sequence[float]) -> float:
 
 
 def _chart(points: OperatingPoints, leg: int, name: str, limit: Deliverable,
-           parameters: Parameters, load: Mapping[str, Any], largest: tuple[float, float],
+           parameters: Parameters, load: MotorLoads, largest: tuple[float, float],
            ) -> Picture:
     picture = Picture(_WIDTH, _HEIGHT, f'Torque over speed of {name}')
     speed, torque = largest
@@ -171,8 +171,8 @@ def _chart(points: OperatingPoints, leg: int, name: str, limit: Deliverable,
     if continuous is not None and continuous[leg] <= torque:
         for level in (continuous[leg], -continuous[leg]):
             picture.line(*chart.at([[0.0, level], [speed, level]]), css='continuous')
-    if load['speed_mean_rad_s'] is not None and load['torque_rms_n_m'] is not None:
-        at = chart.at([load['speed_mean_rad_s'], load['torque_rms_n_m']])
+    if load.speed_mean_rad_s is not None and load.torque_rms_n_m is not None:
+        at = chart.at([load.speed_mean_rad_s, load.torque_rms_n_m])
         picture.path(at + [[0.0, -6.0], [6.0, 0.0], [0.0, 6.0], [-6.0, 0.0]], closed=True,
                      css='rms')
     return picture

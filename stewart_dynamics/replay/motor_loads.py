@@ -4,14 +4,14 @@
 """
 The loads of the motors in a bag: peaks, RMS, heat, power of their common bus, and limits.
 
-Samples are added block by block and are not kept. docs/summary.md defines each number.
+Samples are added block by block and are not kept. ``bag_summary`` defines each number.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,28 +21,29 @@ from stewart_dynamics.mechanics.drives.motors import Motors
 from stewart_dynamics.mechanics.limits import (
     LIMITS, OF_MOTORS, SPEED_MAX, TORQUE_SPEED)
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.reporting.block_statistics import Exceeded, Extreme, finite, Integral
+from stewart_dynamics.replay.bag_summary import Bus, MotorLoads, Motors as LoadsOfAll, NeededMotor
+from stewart_dynamics.reporting.block_statistics import (
+    Exceeded, ExceededLimit, Extreme, finite, Integral)
 
 MARGIN = 1.2  # factor on torques and speed of the motor that is needed
 _OF_VELOCITY = TORQUE_SPEED, SPEED_MAX
 
 
 class Need(NamedTuple):
-    """A load that a motor must bear at least: its key in a leg of summary.json, name and unit."""
+    """A load that a motor must bear at least."""
 
-    load: str
     name: str
     unit: str
     kind: str = ''  # follows the unit
 
 
 # By the key of the motor that is needed.
-NEEDS = {'torque_continuous_n_m': Need('torque_rms_n_m', 'continuous torque', 'N m', 'continuous'),
-         'torque_peak_n_m': Need('torque_peak_n_m', 'peak torque', 'N m', 'peak'),
-         'speed_rad_s': Need('speed_peak_rad_s', 'speed', 'rad/s')}
+NEEDS = {'torque_continuous_n_m': Need('continuous torque', 'N m', 'continuous'),
+         'torque_peak_n_m': Need('peak torque', 'N m', 'peak'),
+         'speed_rad_s': Need('speed', 'rad/s')}
 
 
-class MotorLoads:
+class LoadsOfMotors:
     """
     The loads of the motors of a hexapod that has ``drive.*``.
 
@@ -93,69 +94,67 @@ class MotorLoads:
         return [limit for limit in OF_MOTORS if self._parameters[limit] is not None and (
             limit not in self._exceeded or without_forces and LIMITS[limit].clips)]
 
-    def exceeded(self, legs: Sequence[str]) -> list[dict[str, Any]]:
-        """Return the entries of ``limits`` in summary.json."""
-        return [entry for limit, exceeded in self._exceeded.items()
-                for entry in exceeded.entries(limit, legs)]
+    def exceeded(self, legs: Sequence[str]) -> list[ExceededLimit]:
+        """Return the limits of motors that are exceeded."""
+        return [each for limit, exceeded in self._exceeded.items()
+                for each in exceeded.of_legs(limit, legs)]
 
-    def values(self, legs: Sequence[str], cycles: int) -> dict[str, Any]:
-        """Return the part of summary.json, for a motion of a number of cycles."""
+    def values(self, legs: Sequence[str], cycles: int) -> LoadsOfAll:
+        """Return the loads of the motors, for a motion of a number of cycles."""
         loads = {name: self._motor(leg) for leg, name in enumerate(legs)}
-        return {'legs': loads, 'bus': self._bus(cycles), 'needed': needed(
-            {key: load[key] for key, *_ in NEEDS.values()} for load in loads.values())}
+        return LoadsOfAll(legs=loads, bus=self._bus(cycles), needed=needed_motor(
+            (each.torque_rms_n_m, each.torque_peak_n_m, each.speed_peak_rad_s)
+            for each in loads.values()))
 
-    def _motor(self, leg: int) -> dict[str, float | None]:
+    def _motor(self, leg: int) -> MotorLoads:
         drive = self._parameters.drive
         limited = drive.torque_max is not None or drive.torque_speed is not None
         continuous, fastest = (None if each is None else each[leg]
                                for each in (drive.torque_continuous, drive.speed_max))
         rms, heat = math.sqrt(self._means.mean[leg]), self._electrical.mean[leg]
-        speed, constant = self._speed.values[leg], drive.torque_constant
-        steady = math.nan if drive.thermal_resistance is None else (
-            heat * drive.thermal_resistance[leg])
-        found = {
-            **self._torque.named(leg, 'torque_peak', 'n_m'),
-            'torque_rms_n_m': rms,
-            'torque_margin_n_m': self._margin.values[leg] if limited else None,
-            'torque_margin_at_s': self._margin.at[leg] if limited else None,
-            'torque_continuous_margin_n_m': None if continuous is None else continuous - rms,
-            **self._speed.named(leg, 'speed_peak', 'rad_s'),
-            'speed_mean_rad_s': self._means.mean[6 + leg],
-            'speed_margin_rad_s': None if fastest is None else fastest - abs(speed),
-            'current_peak_a': self._current.values[leg],
-            'current_rms_a': None if constant is None else rms / constant[leg],
-            **self._rise.named(leg, 'temperature_rise_max', 'k'),
-            'temperature_rise_steady_k': steady,
-            'temperature_rise_margin_k': (
-                None if drive.temperature_rise_max is None
-                else drive.temperature_rise_max[leg] - self._rise.values[leg])}
-        if self._quasi_static:
-            found |= {key: None for key in found if 'speed' in key}
-        return {key: finite(value) for key, value in found.items()}
+        constant, steady = drive.torque_constant, drive.thermal_resistance
+        torque, torque_at = self._torque.of_column(leg)
+        margin, margin_at = self._margin.of_column(leg) if limited else (None, None)
+        speed, speed_at = (None, None) if self._quasi_static else self._speed.of_column(leg)
+        rise, rise_at = self._rise.of_column(leg)
+        return MotorLoads(
+            torque_peak_n_m=torque, torque_peak_at_s=torque_at, torque_rms_n_m=finite(rms),
+            torque_margin_n_m=margin, torque_margin_at_s=margin_at,
+            torque_continuous_margin_n_m=None if continuous is None else finite(continuous - rms),
+            speed_peak_rad_s=speed, speed_peak_at_s=speed_at,
+            speed_mean_rad_s=None if self._quasi_static else finite(self._means.mean[6 + leg]),
+            speed_margin_rad_s=None if fastest is None or speed is None else finite(
+                fastest - abs(speed)),
+            current_peak_a=finite(self._current.values[leg]),
+            current_rms_a=None if constant is None else finite(rms / constant[leg]),
+            temperature_rise_max_k=rise, temperature_rise_max_at_s=rise_at,
+            temperature_rise_steady_k=None if steady is None else finite(heat * steady[leg]),
+            temperature_rise_margin_k=None if drive.temperature_rise_max is None else finite(
+                drive.temperature_rise_max[leg] - self._rise.values[leg]))
 
-    def _bus(self, cycles: int) -> dict[str, float | None] | None:
+    def _bus(self, cycles: int) -> Bus | None:
         if self._quasi_static or not math.isfinite(self._drawn.values[0]):
             return None
-        *_, drawn, regenerated = self._electrical.values
+        *_, drawn, regenerated = self._electrical.values.tolist()
         *_, mean_drawn, mean_regenerated = self._electrical.mean
         back = self._regenerated.values[0] < 0.0
-        return {
-            **self._drawn.named(0, 'power_peak', 'w'),
-            'regenerated_peak_w': finite(-self._regenerated.values[0]) if back else 0.0,
-            'regenerated_peak_at_s': finite(self._regenerated.at[0]) if back else None,
-            'power_mean_w': finite(mean_drawn - mean_regenerated),
-            'energy_drawn_j': drawn, 'energy_regenerated_j': regenerated,
-            'cycles': cycles, 'energy_per_cycle_j': (drawn - regenerated) / cycles}
+        peak, at = self._drawn.of_column()
+        return Bus(
+            power_peak_w=peak, power_peak_at_s=at,
+            regenerated_peak_w=finite(-self._regenerated.values[0]) if back else 0.0,
+            regenerated_peak_at_s=finite(self._regenerated.at[0]) if back else None,
+            power_mean_w=finite(mean_drawn - mean_regenerated),
+            energy_drawn_j=drawn, energy_regenerated_j=regenerated,
+            cycles=cycles, energy_per_cycle_j=(drawn - regenerated) / cycles)
 
 
-def needed(loads: Iterable[Mapping[str, Any]]) -> dict[str, float | None]:
+def needed_motor(loads: Iterable[tuple[float | None, float | None, float | None]]) -> NeededMotor:
     """
     Return the smallest motor that bears loads with MARGIN.
 
-    loads: ``torque_rms_n_m``, ``torque_peak_n_m`` and ``speed_peak_rad_s`` of each; None: not
-        known.
+    loads: RMS torque, peak torque and peak speed of each [N m, N m, rad/s]; None: not known.
     """
-    every = list(loads)
-    return {'margin': MARGIN, **{
-        key: max((MARGIN * abs(load[of]) for load in every if load[of] is not None), default=None)
-        for key, (of, *_) in NEEDS.items()}}
+    columns = list(zip(*loads, strict=True)) or [(), (), ()]
+    return NeededMotor(MARGIN, *(max(
+        (MARGIN * abs(each) for each in column if each is not None), default=None)
+        for column in columns))

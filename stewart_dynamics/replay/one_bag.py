@@ -11,13 +11,14 @@ the memory used does not grow with the bag.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import closing, ExitStack
 import hashlib
 import json
 from pathlib import Path
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from msgspec.structs import replace
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
@@ -36,13 +37,15 @@ from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.bag_report import Report
+from stewart_dynamics.replay.bag_summary import (
+    BagSummary, Inputs, Mistake, Rejected, Setpoints as SetpointsOfBag, VERSION)
 from stewart_dynamics.replay.bag_topics import find_topics, notices_of
 from stewart_dynamics.replay.differentiate import differentiator
 from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison, Efforts
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
-from stewart_dynamics.replay.summary_text import measured_headline, summary_text
+from stewart_dynamics.replay.summary_text import summary_text
 from stewart_dynamics.reporting.results_folder import check_free, REPORT_PAGE, whole_folder
 from stewart_dynamics.response.recorded_response import (
     Followed, MEASURED, MEASURED_POSE, RecordedResponse)
@@ -57,8 +60,6 @@ from stewart_dynamics.whole_file import write_json
 if TYPE_CHECKING:
     from stewart_dynamics.replay.uncertain_loads import UncertainLoads
 
-VERSION = 1  # version of summary.json; increased when the meaning of a key changes
-
 Progress = Callable[[int, int], None]
 
 # Starting a process takes as long as writing the outputs of a bag of this size [bytes].
@@ -70,7 +71,7 @@ class Replayed(NamedTuple):
 
     bag: Path
     folder: Path
-    summary: dict[str, Any]  # the content of summary.json; see docs/summary.md
+    summary: BagSummary  # the content of summary.json
     text: str  # the summary for the terminal
     code: int  # DONE, LIMIT_MET or PARTLY_READ, the most severe
 
@@ -110,7 +111,7 @@ def replay(
             if options.measured_table is not None:
                 run.take_table(CsvMotion(options.measured_table, options.reading, None))
             run.end()
-            summary = run.summary() | {'fingerprint': made_of}
+            summary = replace(run.summary(), fingerprint=made_of)
             write_json(partial / RESULT, summary)
             if run.report is not None:
                 run.report.write(
@@ -261,13 +262,14 @@ class _Run:
                          f'first at {self._first_outside}')
         self._files.close()
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> BagSummary:
         """Return the content of summary.json."""
         missing = list(self._recording.missing)
         values = self._summary.values()
-        if not values['setpoints']['answered']:
+        points = values.setpoints
+        if not points.answered:
             missing.append('no setpoint could be answered')
-        elif values['setpoints']['base_unknown'] == values['setpoints']['answered']:
+        elif points.base_unknown == points.answered:
             missing.append("the base's motion is not known at any setpoint: there are no forces")
         mistakes = self._setpoints.mistakes(ever=True)
         if self._differentiator is not None:
@@ -275,10 +277,8 @@ class _Run:
         if self._comparison is not None:
             mistakes += self._comparison.stamps.mistakes(True, [MEASURED])
         unreachable = any(each.reason == OUT_OF_REACH for each in self._setpoints.counts)
-        values['limit_met'] = (values['limit_met'] or bool(mistakes) or unreachable
-                               or self._outside_servos > 0)
         measured = None if self._comparison is None else self._comparison.values()
-        if measured and not measured['setpoints_compared']:
+        if measured and not measured.setpoints_compared:
             missing.append(f'nothing could be compared with {self._options.measured}: no '
                            f'setpoint has valid samples on both sides of its stamp')
         if self._response_missing:
@@ -286,44 +286,30 @@ class _Run:
         notices = [*self._recording.notices, *self.notices]
         if self._more:
             notices.append(f'and {self._more} more like these')
-        return {
-            'version': VERSION,
-            'software': SOFTWARE,
-            'bag': str(self._recording.path),
-            'run': self._options.run,
-            'complete': not missing,
-            'missing': listed(missing),
-            'notices': notices,
-            'inputs': {
-                'node': self._options.node, 'topics': self._topics,
-                'differentiated_cutoff_hz': self._options.cutoff,
-                'measured': self._options.measured,
-                'measured_pose': self._options.measured_pose,
-                'motor_torque': self._options.motor_torque,
-                'motor_current': self._options.motor_current},
-            'rejected': [{'topic': rejection.topic, 'reason': rejection.reason, 'count': number,
-                          'first': self._firsts[rejection].details,
-                          'first_at_s': self._rejected_at(
-                              self._firsts[rejection], values['setpoints'])}
-                         for rejection, number in sorted(self._setpoints.counts.items())],
-            **values,
-            'mistakes': [
-                {'topic': each.topic, 'text': each.text,
-                 'first_at_s': _since_first(each.first, values['setpoints'])}
-                for each in mistakes],
-            'measured': measured and {
-                'headline': measured_headline(measured, self._parameters.leg_kind), **measured},
-            'response': self.followed and self.followed.values,
-            'uncertainty': self._uncertain and self._uncertain.values(),
-            'parameters': self._parameters.plain(),
-        }
+        options = self._options
+        return replace(
+            values, bag=str(self._recording.path), run=options.run, complete=not missing,
+            missing=listed(missing), notices=notices,
+            inputs=Inputs(options.node, self._topics, options.cutoff, options.measured,
+                          options.measured_pose, options.motor_torque, options.motor_current),
+            rejected=[Rejected(
+                rejection.topic, rejection.reason, number, self._firsts[rejection].details,
+                self._rejected_at(self._firsts[rejection], points))
+                for rejection, number in sorted(self._setpoints.counts.items())],
+            limit_met=(values.limit_met or bool(mistakes) or unreachable
+                       or self._outside_servos > 0),
+            mistakes=[Mistake(each.topic, each.text, _since_first(each.first, points))
+                      for each in mistakes],
+            measured=measured, response=self.followed and self.followed.values,
+            uncertainty=self._uncertain and self._uncertain.values(),
+            parameters=self._parameters.plain())
 
     def _rejected(self, rejection: Rejection, details: str) -> None:
         if rejection not in self._firsts:
             self._firsts[rejection] = _First(
                 details, stamp_of(details)[0], self._setpoints.recorded if details else None)
 
-    def _rejected_at(self, first: _First, setpoints: Mapping[str, Any]) -> float | None:
+    def _rejected_at(self, first: _First, setpoints: SetpointsOfBag) -> float | None:
         """Return when a message was rejected, since the first setpoint [s]; None: not known."""
         at = _since_first(first.stamp, setpoints)
         if at is None and self._first_time is not None and first.recorded is not None:
@@ -414,9 +400,9 @@ class _Run:
             self.report.add_measured(*compared)
 
 
-def _since_first(stamp: int | None, setpoints: Mapping[str, Any]) -> float | None:
+def _since_first(stamp: int | None, setpoints: SetpointsOfBag) -> float | None:
     """Return the time of a stamp since the first setpoint [s]; None: not known."""
-    begin = setpoints['first_stamp_ns']
-    if stamp is None or begin is None or setpoints['restarts']:
+    begin = setpoints.first_stamp_ns
+    if stamp is None or begin is None or setpoints.restarts:
         return None
-    return (stamp - int(begin)) * NANOSECOND
+    return (stamp - begin) * NANOSECOND

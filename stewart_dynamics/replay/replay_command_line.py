@@ -170,5 +170,5 @@ def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, stri
 
         replayed = replay(bag, parameters, folder, options, progress)
     _PROGRAM.say(replayed.text)
-    return _PROGRAM.end(folder, {bag: replayed.summary['missing']},
+    return _PROGRAM.end(folder, {bag: replayed.summary.missing},
                         strict and replayed.code == LIMIT_MET)

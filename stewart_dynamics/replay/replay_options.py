@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 import shlex
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import NamedTuple, TYPE_CHECKING
 
 from stewart_dynamics.program import DONE, NODE, PARTLY_READ, STRICT
 from stewart_dynamics.tables.reading import is_table, Reading
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
+    from stewart_dynamics.replay.bag_summary import BagSummary
 
 LIMIT_MET = STRICT
 
@@ -80,7 +81,8 @@ class Options(NamedTuple):
         return parameters.replaced({'setpoint.source': source}) if source else parameters
 
 
-def code_of(summary: Mapping[str, Any]) -> int:
+def code_of(summary: BagSummary) -> int:
     """Return the exit code of a replayed bag."""
-    return (PARTLY_READ if not summary['complete'] else LIMIT_MET
-            if summary['limit_met'] or (summary['measured'] or {}).get('likely_mistake') else DONE)
+    mistake = summary.measured and summary.measured.likely_mistake
+    return PARTLY_READ if not summary.complete else (
+        LIMIT_MET if summary.limit_met or mistake else DONE)

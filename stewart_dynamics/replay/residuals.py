@@ -13,14 +13,15 @@ computed. The external wrench that accounts for it is
 with the sign of ``~/wrench``: the external load on the platform at its origin, base axes (see
 ``external_wrench.estimate``). A platform heavier than in its parameters gives a force downward.
 
-``Comparison.values()`` is the part ``measured`` of summary.json, see docs/summary.md.
+``Comparison.values()`` is the part ``measured`` of summary.json.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from msgspec.structs import replace
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
@@ -34,7 +35,11 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader, MISSING_JOINTS, NUMBERS_END
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.summary import COMPONENTS, key_of, unit_key
+from stewart_dynamics.records import of_kind
+from stewart_dynamics.replay.bag_summary import (
+    Contact, Contacts, EffortsMistake, ExternalWrench, LOADS_OF_WRENCH, Measured, MeasuredLeg,
+    NotCompared)
+from stewart_dynamics.replay.summary_text import measured_headline
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
 from stewart_dynamics.reporting.block_statistics import Extreme
 from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
@@ -79,8 +84,7 @@ class Efforts:
 _SETPOINTS_WAITING = 2 ** 15
 _SAMPLES_WAITING = 2 ** 18
 
-AXES = tuple(COMPONENTS)
-_UNITS = tuple(map(unit_key, COMPONENTS.values()))
+AXES = ExternalWrench.__struct_fields__
 
 # Columns of the rows kept of setpoints.
 _SECONDS, _POSE, _FORCES, _RATES, _ACCELERATIONS = (
@@ -108,7 +112,7 @@ class Comparison:
     """
 
     def __init__(self, parameters: Parameters, of_motors: bool = False) -> None:
-        self._parameters, self._unit = parameters, parameters.leg_kind.effort.unit
+        self._parameters = parameters
         self._losses = of_motors and has_losses(parameters)
         self._ratio = motor_ratio(parameters)
         self._platform = StewartPlatform(parameters)
@@ -189,55 +193,50 @@ class Comparison:
         self._wrench.add(seconds, loads)
         self._sums.add(measured, computed)
 
-    def values(self) -> dict[str, Any]:
-        """Return the part of summary.json."""
-        joints, mistake = self._parameters.joints, self._sums.mistake()
+    def values(self) -> Measured:
+        """Return the comparison."""
+        parameters, mistake, count = self._parameters, self._sums.mistake(), self._legs.count
         load_known = mistake is None or mistake.what == SCALE
         wrench = self._wrench if load_known else _Statistics()
-        return {
-            'setpoints_compared': self._legs.count,
-            'setpoints_not_compared': {
-                'without_measurement': (
-                    self._setpoints.taken - self._legs.count - self._without_force),
-                'without_force': self._without_force},
-            'samples': self._samples.taken,
-            'samples_out_of_order': self._samples.out_of_order,
-            'samples_jumped_back': max(self._samples.pass_number, 0),
-            'gap_limit_s': self._gap * NANOSECOND,
-            **self._of_all_legs(),
-            'legs': {joint: self._leg(leg) for leg, joint in enumerate(joints)},
-            'external_wrench_given': load_known,
-            'likely_mistake': mistake and mistake._asdict(),
-            'external_wrench': {axis: wrench.named(number, '', unit)
-                                for number, (axis, unit) in enumerate(
-                                    zip(AXES, _UNITS, strict=True))},
-            'contacts': self._contacts(load_known),
-        }
-
-    def _of_all_legs(self) -> dict[str, float | None]:
-        number = 6 * self._legs.count
         residual, measured = np.sum(self._legs.squares), np.sum(self._sums.measured_squares)
-        return {key_of('residual_rms', self._unit): np.sqrt(residual / number) if number else None,
-                'residual_share': np.sqrt(residual / measured) if measured else None}
+        found = of_kind(Measured, parameters.leg_kind)(
+            headline='', setpoints_compared=count,
+            setpoints_not_compared=NotCompared(
+                self._setpoints.taken - count - self._without_force, self._without_force),
+            samples=self._samples.taken, samples_out_of_order=self._samples.out_of_order,
+            samples_jumped_back=max(self._samples.pass_number, 0),
+            gap_limit_s=self._gap * NANOSECOND,
+            residual_rms=float(np.sqrt(residual / (6 * count))) if count else None,
+            residual_share=float(np.sqrt(residual / measured)) if measured else None,
+            legs={joint: self._leg(leg) for leg, joint in enumerate(parameters.joints)},
+            external_wrench_given=load_known,
+            likely_mistake=mistake and EffortsMistake(mistake.what, mistake.text),
+            external_wrench=ExternalWrench(**{
+                axis: kind(*wrench.of_quantity(n))
+                for n, (axis, kind) in enumerate(zip(AXES, LOADS_OF_WRENCH, strict=True))}),
+            contacts=self._contacts(load_known))
+        return replace(found, headline=measured_headline(found))
 
-    def _leg(self, leg: int) -> dict[str, float | None]:
-        number = self._legs.count
-        named = self._legs.named(leg, 'residual_', unit_key(self._unit))
-        sums = self._sums
+    def _leg(self, leg: int) -> MeasuredLeg:
+        number, sums = self._legs.count, self._sums
+        residual_rms, residual_mean, residual_peak, peak_at = self._legs.of_quantity(leg)
         measured_squares, squares = sums.measured_squares[leg], sums.computed_squares[leg]
         measured_total, total = sums.measured[leg], sums.computed[leg]
         products = sums.products[leg, leg]
-        rms = [np.sqrt(each / number) if number else None for each in (measured_squares, squares)]
+        rms = [float(np.sqrt(each / number)) if number else None
+               for each in (measured_squares, squares)]
         spread = ((squares * number - total ** 2)
                   * (measured_squares * number - measured_total ** 2))
         # the correlation of constant forces is rounding error
         constant = not 1e-20 * squares * measured_squares * number ** 2 < spread < np.inf
-        correlation = None if constant else np.clip(
-            (products * number - total * measured_total) / np.sqrt(spread), -1.0, 1.0)
-        return {**named, key_of('measured_rms', self._unit): rms[0],
-                key_of('computed_rms', self._unit): rms[1], 'correlation': correlation}
+        correlation = None if constant else float(np.clip(
+            (products * number - total * measured_total) / np.sqrt(spread), -1.0, 1.0))
+        return of_kind(MeasuredLeg, self._parameters.leg_kind)(
+            residual_rms=residual_rms, residual_mean=residual_mean, residual_peak=residual_peak,
+            residual_peak_at_s=peak_at, measured_rms=rms[0], computed_rms=rms[1],
+            correlation=correlation)
 
-    def _contacts(self, load_known: bool) -> dict[str, Any]:
+    def _contacts(self, load_known: bool) -> Contacts:
         number = max(self._legs.count, 1)
         force = float(np.sqrt(np.mean(
             self._sums.computed_squares + self._sums.measured_squares) / number))
@@ -248,15 +247,12 @@ class Comparison:
         found = (self._bins.contacts(middle, threshold, self._gap * NANOSECOND)
                  if load_known else [])
         strongest = sorted(sorted(found, key=lambda each: -each.excess)[:100])
-        return {
-            'count': len(found),
-            'threshold': {f'{axis}_{unit}': each for axis, unit, each in zip(
-                AXES, _UNITS, threshold, strict=True)},
-            'resolution_s': self._bins.width,
-            'strongest': [
-                {'from_s': each.begin, 'to_s': each.end, 'axis': AXES[each.axis],
-                 'force_n': list(each.load[:3]), 'moment_n_m': list(each.load[3:])}
-                for each in strongest]}
+        return Contacts(
+            count=len(found), threshold={f'{axis}_{"n" if n < 3 else "n_m"}': float(threshold[n])
+                                         for n, axis in enumerate(AXES)},
+            resolution_s=self._bins.width,
+            strongest=[Contact(each.begin, each.end, AXES[each.axis], list(each.load[:3]),
+                               list(each.load[3:])) for each in strongest])
 
 
 class _Statistics:
@@ -274,20 +270,17 @@ class _Statistics:
         self.squares += np.sum(values ** 2, axis=1)
         self._peaks.add(seconds, values.T)
 
-    def named(self, number: int, prefix: str, unit: str) -> dict[str, float | None]:
-        """Return RMS, mean and peak under names with units; None without samples."""
-        names = [f'{prefix}rms_{unit}', f'{prefix}mean_{unit}', f'{prefix}peak_{unit}',
-                 f'{prefix}peak_at_s']
+    def of_quantity(self, n: int) -> tuple[float | None, ...]:
+        """Return RMS, mean, peak, and time of the peak of a quantity; None without samples."""
         if not self.count:
-            return dict.fromkeys(names)
-        return dict(zip(names, [
-            np.sqrt(self.squares[number] / self.count), self.sums[number] / self.count,
-            self._peaks.values[number], self._peaks.at[number]], strict=True))
+            return None, None, None, None
+        return (float(np.sqrt(self.squares[n] / self.count)), float(self.sums[n] / self.count),
+                float(self._peaks.values[n]), float(self._peaks.at[n]))
 
 
 # -- contacts: intervals with an external load ----------------------------------------------------
 
-class Contact(NamedTuple):
+class ContactOfBins(NamedTuple):
     """An interval in which an external load acted on the platform."""
 
     begin: float
@@ -348,7 +341,7 @@ class WrenchBins:
         median = np.median(one, axis=0)
         return median, BY_MEDIAN * np.median(np.abs(one - median), axis=0)
 
-    def contacts(self, median: Array, threshold: Array, gap: float) -> list[Contact]:
+    def contacts(self, median: Array, threshold: Array, gap: float) -> list[ContactOfBins]:
         """Return the intervals with values above the threshold; shorter gaps are bridged."""
         filled = np.flatnonzero(np.isfinite(self._first))
         low, high = self._low[filled] - median, self._high[filled] - median
@@ -367,7 +360,7 @@ class WrenchBins:
             peaks = far[inside][most, np.arange(6)]
             times = excess[inside].max(axis=0)
             axis = int(np.argmax(times))
-            found.append(Contact(
+            found.append(ContactOfBins(
                 float(begins[part[0]]), float(ends[part[-1]]), axis, float(times[axis]),
                 tuple(peaks.tolist())))
         return found

@@ -6,85 +6,32 @@
 The summary of a motion: loads on the legs, limits, and distance from singularities.
 
 Samples are added block by block and are not kept. Apart from rounding, the result does not depend
-on how they are split into blocks. docs/summary.md defines each number.
+on how they are split into blocks. ``bag_summary`` defines each number.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.legs import KINDS
-from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
-from stewart_dynamics.mechanics.limits import (
-    Exceedance, LIMITS, Limits, limits_of, POSE, Quantity)
-from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
+from stewart_dynamics.mechanics.limits import Exceedance, LIMITS, Limits, limits_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.motor_loads import MotorLoads
+from stewart_dynamics.records import of_kind
+from stewart_dynamics.replay.bag_summary import (
+    BagSummary, BaseWrench, Force, LegLoads, LOADS_OF_WRENCH, Moment, Setpoints, Singularity,
+    SourceOfEffort)
+from stewart_dynamics.replay.motor_loads import LoadsOfMotors
 from stewart_dynamics.reporting.block_statistics import (
     Crossings, Exceeded, Extreme, finite, FIRST, Integral, longest_step, Warnings, with_nan)
 from stewart_dynamics.setpoints.step import Batch, Outputs
 
 _AT_REST = ('gravity', 'wrench', 'base motion')
-# Units of the components of a wrench.
-COMPONENTS = {f'{part}_{axis}': unit for part, unit in PARTS_OF_WRENCH.items() for axis in 'xyz'}
-_BASE_WRENCH = PARTS_OF_WRENCH | COMPONENTS
-
-
-def margin_key(quantity: Quantity) -> str:
-    """Return the key, in a leg of summary.json, of the margin of a quantity from its limits."""
-    return key_of(f'{quantity.key}_margin', quantity.unit)
-
-
-def key_of(name: str, unit: str) -> str:
-    """Return a key of summary.json, which ends with the unit: torque_peak_n_m."""
-    return f'{name}_{unit_key(unit)}' if unit else name
-
-
-def unit_key(unit: str) -> str:
-    """Return a unit as keys of summary.json end with it: n_m, rad_s."""
-    return unit.lower().replace('/', '_').replace(' ', '_')
-
-
-class LegKeys(NamedTuple):
-    """Keys of a leg in summary.json that are named by the quantities of its drive."""
-
-    position_min: str
-    position_max: str
-    position_margin: str
-    rate_peak: str
-    rate_at: str
-    rate_margin: str
-    effort_peak: str
-    effort_at: str
-    effort_rms: str
-    effort_published: str
-    effort_margin: str
-
-    @classmethod
-    def of(cls, kind: LegKind) -> LegKeys:
-        """Return the keys of a kind of legs."""
-        position, rate, effort = (
-            (each.name, unit_key(each.unit)) for each in (kind.position, kind.rate, kind.effort))
-        return cls(
-            f'{position[0]}_min_{position[1]}', f'{position[0]}_max_{position[1]}',
-            f'{position[0]}_margin_{position[1]}',
-            f'{rate[0]}_peak_{rate[1]}', f'{rate[0]}_peak_at_s', f'{rate[0]}_margin_{rate[1]}',
-            f'{effort[0]}_peak_{effort[1]}', f'{effort[0]}_peak_at_s',
-            f'{effort[0]}_rms_{effort[1]}', f'{effort[0]}_published_peak_{effort[1]}',
-            f'{effort[0]}_margin_{effort[1]}')
-
-
-def kind_in(legs: Mapping[str, Mapping[str, Any]]) -> LegKind:
-    """Return the kind of the legs in summary.json."""
-    keys = next(iter(legs.values()), {})
-    return next((kind for kind in KINDS if LegKeys.of(kind).effort_peak in keys), KINDS[0])
 
 
 class Answered(NamedTuple):
@@ -146,7 +93,7 @@ class Summary:
         self._crossings = Crossings()
         self._warnings = Warnings()
         self._base_wrench = _BaseWrench()
-        self._motors = MotorLoads(parameters, quasi_static) if parameters.drives else None
+        self._motors = LoadsOfMotors(parameters, quasi_static) if parameters.drives else None
         self._sources = sources_of(parameters)
         # one source at a time: numpy is far slower along many columns at once
         self._source_peaks = [Extreme(6, np.abs) for _ in self._sources]
@@ -236,11 +183,11 @@ class Summary:
         self._stamps = first, int(setpoints.stamps[-1])
         return steps
 
-    def values(self) -> dict[str, Any]:
-        """Return the parts of summary.json that depend on the motion, with finite numbers."""
+    def values(self) -> BagSummary:
+        """Return the summary, with finite numbers; what depends on the bag has its default."""
         self._release()
-        limits = [entry for name, exceeded in self._exceeded.items()
-                  for entry in exceeded.entries(name, self._legs)]
+        limits = [each for name, exceeded in self._exceeded.items()
+                  for each in exceeded.of_legs(name, self._legs)]
         not_checked = [name for name in self._limits.bounds if name not in self._exceeded
                        or name in self._names.loads and self._without_force]
         motors = None
@@ -248,109 +195,97 @@ class Summary:
             limits += self._motors.exceeded(self._legs)
             not_checked += self._motors.not_checked(self._without_force > 0)
             motors = self._motors.values(self._legs, self._restarts + 1)
-        return {
-            'quasi_static': self._quasi_static,
-            'setpoints': {
-                'answered': self._answered,
-                'first_stamp_ns': self._stamps[0] if self._stamps else None,
-                'last_stamp_ns': self._stamps[1] if self._stamps else None,
-                'duration_s': self._seconds, 'gaps': self._gaps, 'gaps_s': self._gap_seconds,
-                'restarts': self._restarts,
-                'base_unknown': self._base_unknown,
-                'base_unknown_first_at_s': self._base_unknown_at,
-                'jumps': self._jumps, 'jumps_first_at_s': self._jumped_at},
-            'legs': {name: self._leg(n) for n, name in enumerate(self._legs)},
-            'motors': motors,
-            'limits': limits,
-            'limits_not_checked': not_checked,
-            'singularity': self._singularity(),
-            'force_breakdown': self._force_breakdown(),
-            'base_wrench': self._base_wrench.values(),
-            'limit_met': bool(
-                limits or not_checked or self._jumps) or self._warnings.count > 0,
-        }
+        first, last = self._stamps or (None, None)
+        return of_kind(BagSummary, self._kind)(
+            quasi_static=self._quasi_static,
+            setpoints=Setpoints(
+                answered=self._answered, first_stamp_ns=first, last_stamp_ns=last,
+                duration_s=self._seconds, gaps=self._gaps, gaps_s=self._gap_seconds,
+                restarts=self._restarts, base_unknown=self._base_unknown,
+                base_unknown_first_at_s=self._base_unknown_at, jumps=self._jumps,
+                jumps_first_at_s=self._jumped_at),
+            legs={name: self._leg(n) for n, name in enumerate(self._legs)}, motors=motors,
+            limits=limits, limits_not_checked=not_checked, singularity=self._singularity(),
+            force_breakdown=self._force_breakdown(), base_wrench=self._base_wrench.values(),
+            limit_met=bool(limits or not_checked or self._jumps or self._warnings.count))
 
-    def _leg(self, leg: int) -> dict[str, float | None]:
+    def _leg(self, leg: int) -> LegLoads:
         squares, driving, braking = self._means.mean.reshape(3, 6)[:, leg]
         _, energy_driving, energy_braking = self._means.values.reshape(3, 6)[:, leg]
         solved = self._without_force < self._answered
-        peaks, kind, keys = self._peaks, self._kind, LegKeys.of(self._kind)
+        peaks, kind = self._peaks, self._kind
         lowest, highest = kind.position_limits
-        found: dict[str, float | None] = {
-            keys.position_min: finite(peaks[lowest].values[leg]),
-            keys.position_max: finite(peaks[highest].values[leg]),
-            **peaks[kind.rate_limit].named(
-                leg, f'{kind.rate.name}_peak', unit_key(kind.rate.unit)),
-            **peaks[kind.effort_limit].named(
-                leg, f'{kind.effort.name}_peak', unit_key(kind.effort.unit)),
-            keys.effort_rms: finite(math.sqrt(squares)),
-            keys.effort_published: finite(self._published.values[leg]),
-            **self._power.named(leg, 'power_peak', 'w'),
+        margins = {name: None if bound is None else finite(
+            0.0 - Exceedance(name, leg, peaks[name].values[leg], bound[leg]).excess)
+            for name in peaks for bound in [self._limits.bounds.get(name)]}
+        (rate, rate_at), (effort, effort_at), (power, power_at) = (
+            each.of_column(leg) for each in (
+                peaks[kind.rate_limit], peaks[kind.effort_limit], self._power))
+        moving: dict[str, Any] = {
+            'rate_peak': rate, 'rate_peak_at': rate_at, 'rate_margin': margins[kind.rate_limit],
+            'power_peak_w': power, 'power_peak_at_s': power_at,
             'power_mean_w': finite(driving - braking),
             'energy_driving_j': finite(energy_driving) if solved else None,
             'energy_braking_j': finite(energy_braking) if solved else None}
+        if self._quasi_static:
+            moving = dict.fromkeys(moving)
+        others: dict[str, Any] = {}
         for name, peak in peaks.items():
-            limit, bound = LIMITS[name], self._limits.bounds.get(name)
-            quantity = limit.quantity
             if name not in self._names.usual:
-                what = 'min' if limit.minimum else 'max' if limit.depends == POSE else 'peak'
-                found |= peak.named(leg, f'{quantity.key}_{what}', unit_key(quantity.unit))
-            key, margin = margin_key(quantity), None
-            if bound is not None:
-                margin = finite(
-                    0.0 - Exceedance(name, leg, peak.values[leg], bound[leg]).excess)
-            # a position has two limits
-            found[key] = min((each for each in (found.get(key), margin) if each is not None),
-                             default=None)
-        of_velocity = (
-            keys.rate_peak, keys.rate_at, keys.rate_margin, 'power_peak_w', 'power_peak_at_s',
-            'power_mean_w', 'energy_driving_j', 'energy_braking_j')
-        return found | (dict.fromkeys(of_velocity) if self._quasi_static else {})
+                keys = LegLoads.keys_of_limit(name)
+                others |= dict(zip(keys, (*peak.of_column(leg), margins[name]), strict=True))
+        return of_kind(LegLoads, kind)(
+            position_min=finite(peaks[lowest].values[leg]),
+            position_max=finite(peaks[highest].values[leg]),
+            position_margin=min((each for each in (margins[lowest], margins[highest])
+                                 if each is not None), default=None),
+            effort_peak=effort, effort_peak_at=effort_at, effort_rms=finite(math.sqrt(squares)),
+            effort_published_peak=finite(self._published.values[leg]),
+            effort_margin=margins[kind.effort_limit], **moving, **others)
 
-    def _singularity(self) -> dict[str, Any]:
+    def _singularity(self) -> Singularity:
         # the leg with the largest force under a unit load
         most = np.where(np.isnan(self._unit_load_force.values), -np.inf,
                         self._unit_load_force.values)
         leg = int(most.argmax())
-        crossing = self._time_to_crossing.named(0, 'time_to_crossing_min', 's')
-        if self._quasi_static:
-            crossing = dict.fromkeys(crossing)
-        return {
-            **self._nearest.named(0, 'determinant_nearest', 'm3'),
-            'crossings': self._crossings.count,
-            'crossings_at_s': list(self._crossings.first),
-            **self._condition.named(0, 'condition_max'),
-            'unsolved': self._unsolved, 'suppressed': self._suppressed,
-            **crossing,
-            'unit_load_force_max': finite(most[leg]),
-            'unit_load_force_leg': self._legs[leg] if most[leg] > -np.inf else None,
-            'warnings': self._warnings.count,
-            'warnings_from_to_s': [list(span) for span in self._warnings.first],
-            'warning_s': self._warnings.seconds,
-        }
+        nearest, condition = self._nearest.of_column(), self._condition.of_column()
+        crossing = (None, None) if self._quasi_static else self._time_to_crossing.of_column()
+        return Singularity(
+            determinant_nearest_m3=nearest[0], determinant_nearest_at_s=nearest[1],
+            crossings=self._crossings.count, crossings_at_s=list(self._crossings.first),
+            condition_max=condition[0], condition_max_at_s=condition[1],
+            unsolved=self._unsolved, suppressed=self._suppressed,
+            time_to_crossing_min_s=crossing[0], time_to_crossing_min_at_s=crossing[1],
+            unit_load_force_max=finite(most[leg]),
+            unit_load_force_leg=self._legs[leg] if most[leg] > -np.inf else None,
+            warnings=self._warnings.count,
+            warnings_from_to_s=list(self._warnings.first),
+            warning_s=self._warnings.seconds)
 
-    def _force_breakdown(self) -> dict[str, dict[str, dict[str, float | None]]] | None:
+    def _force_breakdown(self) -> dict[str, dict[str, SourceOfEffort]] | None:
         if not self._has_breakdown:
             return None
         rms = np.sqrt(self._source_squares.mean).reshape(-1, 6)
-        peak_key, rms_key = (key_of(name, self._kind.effort.unit) for name in ('peak', 'rms'))
-        unknown: dict[str, float | None] = {peak_key: None, rms_key: None}
-        return {name: {source: unknown if self._quasi_static and source not in _AT_REST else {
-            peak_key: finite(self._source_peaks[n].values[leg]), rms_key: finite(rms[n, leg])}
-            for n, source in enumerate(self._sources)}
-            for leg, name in enumerate(self._legs)}
+        part = of_kind(SourceOfEffort, self._kind)
+        return {name: {
+            source: part(peak=None, rms=None) if self._quasi_static and source not in _AT_REST
+            else part(peak=finite(self._source_peaks[n].values[leg]), rms=finite(rms[n, leg]))
+            for n, source in enumerate(self._sources)} for leg, name in enumerate(self._legs)}
+
+
+_COLUMNS = 8  # magnitudes of force and moment, and the components
 
 
 class _BaseWrench:
     """Peaks, RMS and means of the base wrench, block by block."""
 
     def __init__(self) -> None:
-        self._peaks = Extreme(len(_BASE_WRENCH), np.abs)
-        self._squares_and_sizes = Integral(2 * len(_BASE_WRENCH))
+        self._peaks = Extreme(_COLUMNS, np.abs)
+        self._squares_and_sizes = Integral(2 * _COLUMNS)
 
     def add(self, seconds: Array, steps: Array, wrenches: Array) -> None:
         """Add times (N,), the time to each from the one before [s], and wrenches (N, 6)."""
-        squares = np.empty((len(seconds), len(_BASE_WRENCH)))
+        squares = np.empty((len(seconds), _COLUMNS))
         with np.errstate(over='ignore'):
             np.square(wrenches, out=squares[:, 2:])
             squares[:, 0] = squares[:, 2] + squares[:, 3] + squares[:, 4]
@@ -359,11 +294,10 @@ class _BaseWrench:
         self._peaks.add(seconds, values)
         self._squares_and_sizes.add(steps, np.concatenate((squares, values), axis=1))
 
-    def values(self) -> dict[str, dict[str, float | None]]:
-        """Return the part of summary.json."""
-        squares, means = self._squares_and_sizes.mean.reshape(2, len(_BASE_WRENCH))
-        numbers = zip(np.sqrt(squares), means, self._peaks.values, self._peaks.at, strict=True)
-        return {name: dict(zip(
-            (f'rms_{unit_key(unit)}', f'mean_{unit_key(unit)}', f'peak_{unit_key(unit)}',
-             'peak_at_s'), map(finite, each), strict=True))
-            for (name, unit), each in zip(_BASE_WRENCH.items(), numbers, strict=True)}
+    def values(self) -> BaseWrench:
+        """Return the loads of the base."""
+        squares, means = self._squares_and_sizes.mean.reshape(2, _COLUMNS)
+        columns = zip(np.sqrt(squares), means, self._peaks.values, self._peaks.at, strict=True)
+        loads = (tuple(map(finite, each)) for each in columns)
+        kinds: tuple[Callable[..., Any], ...] = (Force, Moment, *LOADS_OF_WRENCH)
+        return BaseWrench(*(kind(*each) for kind, each in zip(kinds, loads, strict=True)))

@@ -11,8 +11,6 @@ number of hexapods that exceed it anywhere. Setpoints without efforts are left o
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from stewart_dynamics.arrays import Array
@@ -22,7 +20,9 @@ from stewart_dynamics.mechanics.limits import (
     limit_bounds, LIMITS, Limits, OF_MOTORS, TEMPERATURE_RISE_MAX, TORQUE_SPEED)
 from stewart_dynamics.parameters.structure import limit_name
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.summary import Answered, LegKeys
+from stewart_dynamics.records import of_kind
+from stewart_dynamics.replay.bag_summary import UncertainLeg, UncertainLimit, Uncertainty
+from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.reporting.block_statistics import finite
 
 SEED = 0
@@ -84,19 +84,19 @@ class UncertainLoads:
         low, _, high = np.nanpercentile(efforts, BAND, axis=1)
         return np.concatenate([low, high], axis=1)
 
-    def values(self) -> dict[str, Any]:
-        """Return the part of summary.json."""
-        parameters, keys = self._parameters, LegKeys.of(self._parameters.leg_kind)
+    def values(self) -> Uncertainty:
+        """Return percentiles of the peaks, and the shares of the hexapods that exceed limits."""
+        parameters = self._parameters
         bound = self._limits.bounds.get(parameters.leg_kind.effort_limit)
         legs = {}
         for leg, name in enumerate(parameters.joints):
-            low, middle, high = np.percentile(self._peaks[:, leg], BAND)
-            legs[name] = {
-                f'{keys.effort_peak}_{which}': finite(value) if self._known else None
-                for which, value in (('low', low), ('median', middle), ('high', high))}
-            legs[name][f'{keys.effort_margin}_low'] = (
-                None if bound is None or not self._known else finite(bound[leg] - high))
-        return {
-            'hexapods': self._count, 'legs': legs,
-            'limits': [{'limit': name, 'hexapods': int(each.sum()),
-                        'share': float(each.mean())} for name, each in self._exceeding.items()]}
+            low, middle, high = (finite(each) if self._known else None
+                                 for each in np.percentile(self._peaks[:, leg], BAND))
+            legs[name] = of_kind(UncertainLeg, parameters.leg_kind)(
+                effort_peak_low=low, effort_peak_median=middle, effort_peak_high=high,
+                effort_margin_low=None if bound is None or high is None else finite(
+                    bound[leg] - high))
+        return of_kind(Uncertainty, parameters.leg_kind)(
+            hexapods=self._count, legs=legs,
+            limits=[UncertainLimit(name, int(each.sum()), float(each.mean()))
+                    for name, each in self._exceeding.items()])

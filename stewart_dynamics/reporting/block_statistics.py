@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import math
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.records import means, Number, Record
 
 # Maximum number of crossings and of warnings that are listed; all are counted.
 LISTED = 100
@@ -60,10 +61,24 @@ class Extreme:
         self.values = np.where(new, values[row, self._columns], self.values)
         self.at = np.where(new, seconds[row], self.at)
 
-    def named(self, column: int, name: str, unit: str = '') -> dict[str, float | None]:
-        """Return value and time of a column for summary.json, under names with units."""
-        return {f'{name}_{unit}' if unit else name: finite(self.values[column]),
-                f'{name}_at_s': finite(self.at[column])}
+    def of_column(self, column: int = 0) -> tuple[float | None, float | None]:
+        """Return value and time of a column; None: not known."""
+        return finite(self.values[column]), finite(self.at[column])
+
+
+class ExceededLimit(Record):
+    """A limit that a leg exceeds by more than 1e-9 of it."""
+
+    limit: Annotated[str, means(
+        'name of the parameter: one of `limits.*`, `drive.torque_max`, `drive.torque_speed`, '
+        '`drive.speed_max` or `drive.temperature_rise_max`')]
+    leg: Annotated[str, means('name of the leg')]
+    setpoints: Annotated[int, means('number of setpoints at which it is exceeded')]
+    worst: Annotated[Number, means(
+        "value with the largest excess, with its sign, in the limit's unit")]
+    bound: Annotated[float, means(
+        'the limit; of `drive.torque_speed` at the speed of the worst value')]
+    first_at_s: Annotated[float, means('when it is first exceeded')]
 
 
 class Exceeded:
@@ -93,11 +108,11 @@ class Exceeded:
                             (self._bounds, np.broadcast_to(bounds, values.shape))):
             kept[more] = found[worst][more]
 
-    def entries(self, limit: str, legs: Sequence[str]) -> list[dict[str, Any]]:
-        """Return the legs that exceed the limit, for summary.json."""
-        return [{'limit': limit, 'leg': legs[leg], 'setpoints': self._samples[leg],
-                 'worst': finite(self._worst[leg]), 'bound': self._bounds[leg],
-                 'first_at_s': self._first_at[leg]}
+    def of_legs(self, limit: str, legs: Sequence[str]) -> list[ExceededLimit]:
+        """Return the legs that exceed the limit."""
+        return [ExceededLimit(limit, legs[leg], int(self._samples[leg]),
+                              finite(self._worst[leg]), float(self._bounds[leg]),
+                              float(self._first_at[leg]))
                 for leg in np.flatnonzero(self._samples)]
 
 
@@ -176,7 +191,7 @@ class Warnings:
 
     def __init__(self) -> None:
         self.count = 0
-        self.first: list[list[float | None]] = []
+        self.first: list[tuple[float, float | None]] = []
         self.seconds = 0.0
         self._on = False
 
@@ -188,15 +203,15 @@ class Warnings:
         self.count += int(warnings[changes].sum())
         for at in changes[:2 * LISTED].tolist():
             if warnings[at] and len(self.first) < LISTED:
-                self.first.append([float(seconds[at]), None])
+                self.first.append((float(seconds[at]), None))
             elif not warnings[at] and self.first[-1][1] is None:
-                self.first[-1][1] = float(seconds[at])
+                self.first[-1] = self.first[-1][0], float(seconds[at])
         self._on = bool(warnings[-1])
 
 
 def finite(value: float | None) -> float | None:
     """Return a number, None if it is not known or not finite."""
-    return value if value is not None and math.isfinite(value) else None
+    return float(value) if value is not None and math.isfinite(value) else None
 
 
 def with_nan(values: Array) -> Flags:

@@ -11,8 +11,8 @@ by its periods, see ``frequency_response``; other motion as a whole.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
+from msgspec.structs import asdict
 import numpy as np
 
 from stewart_dynamics.arrays import Array
@@ -21,8 +21,10 @@ from stewart_dynamics.response.frequency_response import (
     FrequencyResponses, Part, parts_by_inputs, periodic_parts, responses, spectra)
 from stewart_dynamics.response.local_responses import interpolated, local_responses
 from stewart_dynamics.response.response_measures import CERTAIN, Response
+from stewart_dynamics.response.response_record import (
+    AxesResponse, AxisResponse, LegBalance, LegResponse)
 
-AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
+AXES = AxesResponse.__struct_fields__[:6]
 # Part of the largest motion of an axis below which another axis is not excited.
 _EXCITED = 1e-3
 _STILL = 1e-9  # [m, rad]
@@ -235,11 +237,11 @@ def _both(run: Run, part: Part | None = None) -> Array:
     return np.hstack([run.commanded[which], run.achieved[which]])
 
 
-def axes_response(recorded: Runs, size: float) -> dict[str, Any]:
-    """Return the part of ``response`` about the axes; ``size`` [m] compares turns with shifts."""
+def axes_response(recorded: Runs, size: float) -> AxesResponse:
+    """Return the responses of the axes; ``size`` [m] compares turns with shifts."""
     analysis = Analysis(recorded, [size] * 3 + [1.0] * 3)
     found = analysis.axes()
-    result: dict[str, Any] = {}
+    axes = {}
     for axis, name in enumerate(AXES):
         pieces = [(several, inputs.index(axis)) for inputs, several in found if axis in inputs]
         own = [analysis.one(several, axis, number) for several, number in pieces]
@@ -248,14 +250,13 @@ def axes_response(recorded: Runs, size: float) -> dict[str, Any]:
         noise = next((several for (several, _), one in zip(pieces, own, strict=True)
                       if len(one.frequency)), found[0][1] if found and not excited else None)
         repeated = analysis.deviations(axis) if excited else None
-        result[name] = {
-            **(response.measures() if excited else _NOT_EXCITED),
-            'cross': _cross(analysis, pieces, axis) if excited else {},
-            'noise': None if noise is None else float(
-                np.sqrt(noise.noise[:, axis] @ noise.widths)),
-            'repeatability': repeated and repeated[0], 'turn_around': repeated and repeated[1],
-            'reason': None if response.coherent.any() else _reason(analysis, excited, found, axis)}
-    return result | {'clock_drift': analysis.clock_drift()}
+        axes[name] = AxisResponse(
+            **(asdict(response.measures()) if excited else {}),
+            cross=_cross(analysis, pieces, axis) if excited else {},
+            noise=None if noise is None else float(np.sqrt(noise.noise[:, axis] @ noise.widths)),
+            repeatability=repeated and repeated[0], turn_around=repeated and repeated[1],
+            reason=None if response.coherent.any() else _reason(analysis, excited, found, axis))
+    return AxesResponse(**axes, clock_drift=analysis.clock_drift())
 
 
 def _reason(analysis: Analysis, excited: bool,
@@ -280,13 +281,6 @@ def _moved_alike(several: FrequencyResponses, inputs: Sequence[int], axis: int) 
     mean = alike[known].mean(axis=0) if known.any() else np.zeros(len(inputs))
     alone = [each for n, each in enumerate(inputs) if each != axis and mean[n] > _ALIKE]
     return alone or [each for each in inputs if known.any()]
-
-
-_NOT_EXCITED: dict[str, Any] = {name: [] for name in (
-    'frequency', 'gain', 'phase', 'coherence', 'gain_low', 'gain_high', 'phase_low', 'phase_high')
-    } | dict.fromkeys(('delay', 'bandwidth_3db', 'bandwidth_90deg', 'second_order')
-                      ) | dict.fromkeys(('bandwidth_3db_bounds', 'bandwidth_90deg_bounds'),
-                                        (None, None)) | {'opposite': False}
 
 
 def _joined(pieces: Sequence[Response]) -> Response:
@@ -315,16 +309,17 @@ def _cross(analysis: Analysis, pieces: Sequence[tuple[FrequencyResponses, int]],
     return cross
 
 
-def legs_response(recorded: Runs, joints: Sequence[str]) -> dict[str, Any]:
-    """Return the parts of ``response`` about the legs."""
+def legs_response(recorded: Runs, joints: Sequence[str],
+                  ) -> tuple[dict[str, LegResponse], LegBalance | None]:
+    """Return the responses of the legs, and the largest difference between two."""
     found = Analysis(recorded, [1.0] * 6).legs()
     legs = {joint: one.measures() for joint, one in zip(joints, found, strict=False)
             if len(one.frequency)}
-    return {'legs': legs, 'leg_balance': _balance(found)}
+    return legs, _balance(found)
 
 
-def _balance(legs: Sequence[Response]) -> dict[str, float] | None:
-    """Return the largest difference in phase [deg] between two legs, and where [Hz]."""
+def _balance(legs: Sequence[Response]) -> LegBalance | None:
+    """Return the largest difference in phase between two legs, and where."""
     legs = [each for each in legs if each.coherent.any()]
     if len(legs) < 2:
         return None
@@ -338,4 +333,4 @@ def _balance(legs: Sequence[Response]) -> dict[str, float] | None:
     phases = np.array([np.interp(common, each.frequency, each.phase) for each in legs])
     spread = np.degrees(np.ptp(phases, axis=0))
     at = int(spread.argmax())
-    return {'phase_difference': float(spread[at]), 'frequency': float(common[at])}
+    return LegBalance(float(spread[at]), float(common[at]))

@@ -12,8 +12,9 @@ All samples are kept until the end: 200 bytes for each setpoint and measured sam
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from msgspec.structs import asdict
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers, Records, Stamps
@@ -32,6 +33,8 @@ from stewart_dynamics.response.even_samples import (
     at_even_times, check_overlap, clock_notices, Runs, Track, Tracks, without_frozen)
 from stewart_dynamics.response.frequency_response import signal_module
 from stewart_dynamics.response.response_measures import COHERENT
+from stewart_dynamics.response.response_record import (
+    AxesResponse, LegBalance, LegResponse, RecordedResponses)
 from stewart_dynamics.setpoints import input_messages as inputs
 from stewart_dynamics.setpoints.input_messages import SampleReader
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejections
@@ -44,9 +47,9 @@ NO_POSE = 'no pose has these'  # positions of the drives
 
 
 class Followed(NamedTuple):
-    """How a platform follows: the values of summary.json, and the samples that plots show."""
+    """How a platform follows, and the samples that plots show."""
 
-    values: dict[str, Any]
+    values: RecordedResponses
     samples: Runs  # of the six axes
 
 
@@ -136,7 +139,8 @@ class RecordedResponse:
             self.notices.append(f'response: {frozen} samples of {self._topic} are left out: they '
                                 'repeat the one before while the setpoints move')
         timeout = self._parameters.setpoint.timeout
-        legs: dict[str, Any] = {'legs': {}, 'leg_balance': None}
+        legs: dict[str, LegResponse] = {}
+        balance: LegBalance | None = None
         if self.key == MEASURED:
             measured = measured._replace(
                 values=measured.values + self._parameters.geometry.zero_length)
@@ -145,7 +149,7 @@ class RecordedResponse:
                      commanded.values[:, ROTATION].reshape(-1, 3, 3))))
             own = at_even_times(positions, measured, timeout)
             if own.runs:
-                legs = legs_response(own, self._parameters.joints)
+                legs, balance = legs_response(own, self._parameters.joints)
             measured, lost = achieved_poses(self._platform.structure, measured, commanded)
             if lost:
                 named = self._parameters.leg_kind.position.field
@@ -161,30 +165,31 @@ class RecordedResponse:
         size = self._parameters.singularity.characteristic_length
         axes = axes_response(samples, size)
         if shift is not None:
-            for name in AXES:
-                axes[name]['delay'] = None
+            for axis in axes.axes.values():
+                axis.delay = None
         self.notices += clock_notices(commanded, measured, self._topic, [
-            axes[name]['delay'] for name in AXES if axes[name]['delay'] is not None],
-            axes['clock_drift'])
+            axis.delay for axis in axes.axes.values() if axis.delay is not None],
+            axes.clock_drift)
         self.notices += [
             f'{self._topic}: {name} moves opposite to its setpoints: the sign of an axis differs'
-            for name in AXES if axes[name]['opposite']]
+            for name, axis in axes.axes.items() if axis.opposite]
         self.notices += _unit_notices(axes, self._topic)
-        return Followed({
-            **axes, **legs, 'topic': self._topic, 'samples': len(measured.stamps),
-            'rate': samples.rate, 'highest_frequency': samples.highest}, samples)
+        return Followed(RecordedResponses(
+            **asdict(axes), legs=legs, leg_balance=balance, topic=self._topic,
+            samples=len(measured.stamps), rate=samples.rate,
+            highest_frequency=samples.highest), samples)
 
 
-def _unit_notices(axes: Mapping[str, Any], topic: str) -> list[str]:
+def _unit_notices(axes: AxesResponse, topic: str) -> list[str]:
     """Return notices of shifts and of turns whose scale at low frequencies no drive has."""
     notices = []
     for names, words in ((AXES[:3], 'lengths in m'), (AXES[3:], 'angles in rad')):
         off = {}
         for name in names:
-            axis = axes[name]
-            slowest = np.flatnonzero(np.asarray(axis['coherence']) >= COHERENT)[:1]
-            gain = float(np.asarray(axis['gain'])[slowest[0]]) if len(slowest) else 1.0
-            if axis['reason'] is None and not _SMALLEST < gain < _LARGEST:
+            axis = axes.axes[name]
+            gain = next((gain for gain, coherence in zip(axis.gain, axis.coherence, strict=True)
+                         if coherence >= COHERENT), 1.0)
+            if axis.reason is None and not _SMALLEST < gain < _LARGEST:
                 off[name] = gain
         if off:
             notices.append(

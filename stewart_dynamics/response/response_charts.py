@@ -5,15 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
-from stewart_dynamics.response.axes_response import AXES
 from stewart_dynamics.response.even_samples import Run, Runs
+from stewart_dynamics.response.response_record import LegResponse, RecordedResponses
 
 _WIDTH = 400.0
 _LEFT, _ACROSS = 46.0, 344.0
@@ -22,32 +22,30 @@ _GAIN, _PHASE, _COHERENCE = (26.0, 130.0), (206.0, 130.0), (386.0, 50.0)
 _TIME = (26.0, 150.0)
 # Lowest gain and phase that a plot shows [dB, deg].
 _LOWEST_GAIN, _LOWEST_PHASE = -40.0, -540.0
-# Endings of the keys of a value and of its band.
-_BAND = ('', '_low', '_high')
 # Time around a turn-around and after a step that is shown [s], and the same in delays.
 _AROUND, _IN_DELAYS = 0.2, 6.0
 
 
-def bode_charts(response: Mapping[str, Any]) -> dict[str, str]:
+def bode_charts(response: RecordedResponses) -> dict[str, str]:
     """Return a Bode plot (SVG) of each axis that was excited, all with the same axes."""
-    excited = {name: response[name] for name in AXES if len(response[name]['frequency'])}
+    excited = {name: axis for name, axis in response.axes.items() if axis.frequency}
     return {name: _bode(f'Frequency response of {name}', [one], _span(list(excited.values())),
                         True) for name, one in excited.items()}
 
 
-def legs_chart(response: Mapping[str, Any]) -> str:
+def legs_chart(response: RecordedResponses) -> str:
     """Return a Bode plot (SVG) of all legs; empty where they were not measured."""
-    legs = list(response['legs'].values())
+    legs = list(response.legs.values())
     return _bode('Frequency responses of the legs', legs, _span(legs), False) if legs else ''
 
 
-def _span(several: Sequence[Mapping[str, Any]]) -> tuple[float, float, float, float]:
+def _span(several: Sequence[LegResponse]) -> tuple[float, float, float, float]:
     """Return lowest and highest frequency, lowest gain [dB] and phase [deg] of responses."""
     if not several:
         return 0.1, 1.0, _LOWEST_GAIN, _LOWEST_PHASE
-    f, gain, phase = (np.concatenate([each[name] for each in several])
-                      for name in ('frequency', 'gain', 'phase'))
-    sure = np.concatenate([each['coherence'] for each in several]) > 0.5
+    f, gain, phase, coherence = (np.concatenate(each) for each in zip(*(
+        (one.frequency, one.gain, one.phase, one.coherence) for one in several), strict=True))
+    sure = coherence > 0.5
     lowest_gain = float(_decibels(gain[sure]).min(initial=-10.0))
     lowest_phase = float(phase[sure].min(initial=-90.0))
     low, high = float(f.min()), float(f.max())
@@ -62,7 +60,7 @@ def _decibels(gain: Any) -> Array:
     return found.clip(-300.0, 300.0)
 
 
-def _bode(title: str, several: Sequence[Mapping[str, Any]],
+def _bode(title: str, several: Sequence[LegResponse],
           span: tuple[float, float, float, float], alone: bool) -> str:
     low, high, lowest_gain, lowest_phase = span
     picture = Picture(_WIDTH, 474.0 if alone else 376.0, title)
@@ -75,11 +73,11 @@ def _bode(title: str, several: Sequence[Mapping[str, Any]],
     for chart, level in ((gains, -3.0), (phases, -90.0)):
         picture.line(*chart.at([[low, level], [high, level]]), css='continuous')
     for n, one in enumerate(several):
-        f = np.asarray(one['frequency'])
+        f = np.asarray(one.frequency)
         css = 'response' if alone else f'response leg{n}'
         for chart, (value, lower, upper) in (
-                (gains, [_decibels(one[f'gain{end}']) for end in _BAND]),
-                (phases, [np.asarray(one[f'phase{end}']) for end in _BAND])):
+                (gains, map(_decibels, (one.gain, one.gain_low, one.gain_high))),
+                (phases, map(np.asarray, (one.phase, one.phase_low, one.phase_high)))):
             least, most = chart.y
             if alone:
                 band = np.column_stack([np.concatenate([f, f[::-1]]), np.concatenate(
@@ -96,18 +94,18 @@ def _bode(title: str, several: Sequence[Mapping[str, Any]],
                           logarithmic=True)
         coherence.draw_axes('frequency [Hz]', 'coherence', 2)
         picture.path(coherence.at(np.column_stack(
-            [several[0]['frequency'], several[0]['coherence']])), css='response')
+            [several[0].frequency, several[0].coherence])), css='response')
     return picture.svg()
 
 
-def zoom_charts(response: Mapping[str, Any], samples: Runs) -> dict[str, tuple[str, str]]:
+def zoom_charts(response: RecordedResponses, samples: Runs) -> dict[str, tuple[str, str]]:
     """Return pictures (SVG) of each excited axis: its fastest change, its sharpest turn-around."""
-    return {name: (_zoom(samples, axis, response[name]['delay'], turn=False),
-                   _zoom(samples, axis, response[name]['delay'], turn=True))
-            for axis, name in enumerate(AXES) if len(response[name]['frequency'])}
+    return {name: (_zoom(samples, n, name, axis.delay, turn=False),
+                   _zoom(samples, n, name, axis.delay, turn=True))
+            for n, (name, axis) in enumerate(response.axes.items()) if axis.frequency}
 
 
-def _zoom(samples: Runs, axis: int, delay: float | None, turn: bool) -> str:
+def _zoom(samples: Runs, axis: int, name: str, delay: float | None, turn: bool) -> str:
     """Return commanded and achieved values around the fastest change or turn-around."""
     reach = max(_AROUND, _IN_DELAYS * (delay or 0.0))
     margin = round(reach * samples.rate)
@@ -129,11 +127,11 @@ def _zoom(samples: Runs, axis: int, delay: float | None, turn: bool) -> str:
     low, high = float(values.min()), float(values.max())
     margin_y = 0.05 * (high - low) or 1.0
     what = 'turn-around' if turn else 'fastest change'
-    picture = Picture(_WIDTH, 218.0, f'{AXES[axis]}: {what}, commanded and achieved')
+    picture = Picture(_WIDTH, 218.0, f'{name}: {what}, commanded and achieved')
     top, height = _TIME
     chart = Chart(picture, (_LEFT, top, _ACROSS, height), (float(seconds[0]), float(seconds[-1])),
                   (low - margin_y, high + margin_y))
-    chart.draw_axes(f'time from {run.seconds[at]:.2f} s [s]', f'{AXES[axis]} [{unit}]')
+    chart.draw_axes(f'time from {run.seconds[at]:.2f} s [s]', f'{name} [{unit}]')
     for line, css in zip(values, ('commanded', 'response'), strict=True):
         picture.path(chart.at(np.column_stack([seconds, line])), css=css)
     return picture.svg()

@@ -10,13 +10,13 @@ flight simulator motion systems, 1979; 14 CFR Part 60, appendix A, attachment 2)
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.response.frequency_response import Complex
+from stewart_dynamics.response.response_record import LegResponse, SecondOrder
 
 # Coherence from which on a frequency counts for the measures.
 COHERENT = 0.5
@@ -32,9 +32,6 @@ _PHASE_FLOOR = 1e-6
 _LACK_OF_FIT = 0.03
 # A drive of second order is fitted up to this multiple of the frequency of -90 degrees.
 _FITTED = 3.0
-
-# Names of the bandwidths, and the keys in summary.json.
-BANDWIDTHS = ('-3 dB', 'bandwidth_3db'), ('-90 deg', 'bandwidth_90deg')
 
 
 class Response(NamedTuple):
@@ -64,8 +61,8 @@ class Response(NamedTuple):
         turns: Array = phase + 2.0 * np.pi * np.round((near - phase) / (2.0 * np.pi))
         return turns
 
-    def measures(self) -> dict[str, Any]:
-        """Return arrays and measures, as in summary.json."""
+    def measures(self) -> LegResponse:
+        """Return arrays and measures."""
         gain, phase = np.abs(self.value), np.degrees(self.phase)
         with np.errstate(divide='ignore', invalid='ignore'):
             angle = np.degrees(np.arcsin(np.minimum(self.radius / gain, 1.0)))
@@ -73,16 +70,14 @@ class Response(NamedTuple):
         bands = (np.maximum(gain - self.radius, 0.0), gain + self.radius,
                  phase - angle, phase + angle)
         model = self.second_order()
-        return {
-            'frequency': self.frequency, 'opposite': self.opposite, 'gain': gain, 'phase': phase,
-            'coherence': self.coherence,
-            'gain_low': bands[0], 'gain_high': bands[1],
-            'phase_low': bands[2], 'phase_high': bands[3],
-            'delay': _slow_delay(model) if model else self.delay(),
-            'bandwidth_3db': self.bandwidth_3db, 'bandwidth_90deg': self.bandwidth_90deg,
-            'bandwidth_3db_bounds': self._bounds(*(_above_half_power(each) for each in bands[:2])),
-            'bandwidth_90deg_bounds': self._bounds(*(each + 90.0 for each in bands[2:])),
-            'second_order': model}
+        return LegResponse(
+            self.frequency.tolist(), self.opposite, gain.tolist(), phase.tolist(),
+            self.coherence.tolist(), bands[0].tolist(), bands[1].tolist(), bands[2].tolist(),
+            bands[3].tolist(), delay=_slow_delay(model) if model else self.delay(),
+            bandwidth_3db=self.bandwidth_3db, bandwidth_90deg=self.bandwidth_90deg,
+            bandwidth_3db_bounds=self._bounds(*(_above_half_power(each) for each in bands[:2])),
+            bandwidth_90deg_bounds=self._bounds(*(each + 90.0 for each in bands[2:])),
+            second_order=model)
 
     @property
     def bandwidth_3db(self) -> float | None:
@@ -164,7 +159,7 @@ class Response(NamedTuple):
         solution = np.linalg.lstsq(columns * weights[:, None], phase * weights, rcond=None)[0]
         return float(-solution[0] / scale)
 
-    def second_order(self) -> dict[str, float] | None:
+    def second_order(self) -> SecondOrder | None:
         """
         Return gain, delay, natural frequency and damping of the drive of second order, if it fits.
 
@@ -200,13 +195,12 @@ class Response(NamedTuple):
         most = _LACK_OF_FIT ** 2 + np.mean(np.abs(radius / value) ** 2)
         if not (fit.success and off <= most and damping > 0.0):
             return None
-        return {'gain': gain, 'delay': delay, 'damping': damping,
-                'natural_frequency': float(np.exp(log_omega) / (2.0 * np.pi))}
+        return SecondOrder(gain, delay, damping, float(np.exp(log_omega) / (2.0 * np.pi)))
 
 
-def _slow_delay(model: Mapping[str, float]) -> float:
+def _slow_delay(model: SecondOrder) -> float:
     """Return by how much slow motion is late behind a drive of second order [s]."""
-    return model['delay'] + model['damping'] / (np.pi * model['natural_frequency'])
+    return model.delay + model.damping / (np.pi * model.natural_frequency)
 
 
 def _above_half_power(gain: Array) -> Array:
@@ -216,11 +210,15 @@ def _above_half_power(gain: Array) -> Array:
     return above.clip(-100.0)
 
 
-def bandwidth(measures: Mapping[str, Any], key: str) -> str:
-    """Return in words where a bandwidth is, or on which side of the frequencies."""
-    low, high = measures[f'{key}_bounds']
-    if (at := measures[key]) is not None:
+def bandwidths(measures: LegResponse) -> dict[str, str]:
+    """Return in words where each bandwidth is, or on which side of the frequencies."""
+    return {'-3 dB': _where(measures.bandwidth_3db, *measures.bandwidth_3db_bounds),
+            '-90 deg': _where(measures.bandwidth_90deg, *measures.bandwidth_90deg_bounds)}
+
+
+def _where(at: float | None, low: float | None, high: float | None) -> str:
+    if at is not None:
         return f'at {at:.3g} Hz'
-    if low is None and high is None:
-        return 'not certain'
-    return f'below {high:.3g} Hz' if low is None else f'above {low:.3g} Hz'
+    if low is None:
+        return 'not certain' if high is None else f'below {high:.3g} Hz'
+    return f'above {low:.3g} Hz'
