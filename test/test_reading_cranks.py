@@ -19,6 +19,7 @@ from stewart_dynamics.description.formats import read_hexapod
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.mjcf import mjcf
 from stewart_dynamics.description.recognition import Recognized
+from stewart_dynamics.description.sdf import sdf
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.frames.rotation import to_euler, to_quaternion
 from test_reading import foreign
@@ -50,6 +51,16 @@ def with_named_frames(p: Parameters) -> str:
         for frame, end in ((f'{leg}_tip', 1), (f'{leg}_platform_joint', 2)):
             text = text.replace(f'"{frame}"', f'"closing_{n}_{end}"')
     return text
+
+
+def test_a_revolute_joint_of_an_sdf_without_an_axis_turns_about_z(tmp_path: Path) -> None:
+    root = ET.fromstring(sdf(Hexapod(RIG), 'hexapod'))
+    for joint in root.iter('joint'):
+        for axis in joint.findall('axis'):
+            joint.remove(axis)
+    found = read(ET.tostring(root, encoding='unicode'), tmp_path / 'x.sdf').parameters
+    assert_equal(found, RIG, GEOMETRY + MASSES)
+    assert all(found[name] is None for name in LIMITS)
 
 
 @pytest.mark.parametrize('seed', range(3))

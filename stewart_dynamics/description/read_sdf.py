@@ -15,7 +15,7 @@ from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.legs.mechanism import (
     DescriptionError, FIXED, HERE, Joint, Mechanism, MechanismBody, Placement, WORLD)
 
-SDFORMAT = Defaults(axis='0 0 1', mass=1.0, moment=1.0, least=0.0)
+SDFORMAT = Defaults(axis='0 0 1', xyz='0 0 1', mass=1.0, moment=1.0, least=0.0)
 _DRAKE = f'{{{DRAKE}}}'
 _MODEL = '__model__'
 # The end of the name of Gazebo's system, which was another in Ignition.

@@ -59,7 +59,7 @@ class UrdfModel(XmlModel):
         self._root = root
         self._names = [link.get('name', '') for link in root.findall('link')]
         super().__init__(source, self._names, Defaults(
-            axis='1 0 0', mass=None, moment=0.0, least=-math.inf), {})
+            axis='1 0 0', xyz=None, mass=None, moment=0.0, least=-math.inf), {})
         self.joints = [joint for joint in root.findall('joint') if joint.find('child') is not None]
         for joint in self.joints:
             self.add_frame(self.end(joint, 'child'), self.end(joint, 'parent'), self.pose(joint))

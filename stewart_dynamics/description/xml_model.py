@@ -36,6 +36,7 @@ class Defaults(NamedTuple):
     """Values of missing elements."""
 
     axis: str  # of a joint, in its frame
+    xyz: str | None  # of an element axis
     mass: float | None  # of a link [kg]
     moment: float  # of a link about each axis [kg m^2]
     least: float  # smaller limits of rates and forces are unlimited
@@ -167,7 +168,8 @@ class XmlModel:
         axes = [each for each in (joint.find('axis'), joint.find('axis2')) if each is not None]
         if kind in (HINGE, SLIDE, UNIVERSAL):
             made.axes = [self.axis_frame(axis, at).rotation @ self.unit(
-                _text(axis, 'xyz') or defaults.axis, f'axis of joint {name!r}')
+                defaults.axis if axis is joint else _text(axis, 'xyz') or defaults.xyz,
+                f'axis of joint {name!r}')
                 for axis in axes or [joint] * (kind != UNIVERSAL)]
         for holder in (joint, *axes):
             self._add_dynamics(holder, made)
