@@ -46,7 +46,7 @@ install_requires = [
 extras_require = {
     'calibrate': ['scipy>=1.10'],
     'cluster': ['distributed>=2024.1'],
-    'completion': ['argcomplete>=3.1'],
+    'completion': ['argcomplete>=3.2.3'],  # before, zsh has no := in names of parameters
     'differentiate': ['scipy>=1.10'],
     'docs': [
         'docutils>=0.21',  # tex2mathml has as_block

@@ -102,7 +102,7 @@ def test_millimeters_and_degrees_become_meters_and_radians(tmp_path: Path) -> No
 def test_joints_as_points_are_asked_leg_by_leg_in_meters(tmp_path: Path) -> None:
     points = TELESCOPIC_EXAMPLE.geometry.base_joints + [0.0, 0.01, 0.0]
     rows = [' '.join(map(repr, row.tolist())) for row in points]
-    done = answer(tmp_path, 'telescopic', 'points', 'm', 'rad', *rows, *[''] * 18)
+    done = answer(tmp_path, 't', 'p', 'm', 'rad', *rows, *[''] * 18)
     assert (done.returncode, done.stderr) == (0, '')
     found = Parameters.from_yaml(tmp_path / 'my_hexapod.yaml')
     assert np.array_equal(found.geometry.base_joints, points)
@@ -149,7 +149,7 @@ def test_no_file_is_replaced_unless_the_answer_is_yes(tmp_path: Path) -> None:
         assert done.stderr.count('\n') == 1
         assert file.read_text() == 'mine\n'
         assert [path.name for path in tmp_path.iterdir()] == [file.name]
-    for lines, arguments in ((('yes',), ()), ((), ('--force',))):
+    for lines, arguments in ((('yes',), ()), (('y',), ()), ((), ('--force',))):
         file.write_text('mine\n')
         assert answer(tmp_path, *lines, *BEGIN, *KEPT, arguments=arguments).returncode == 0
         assert Parameters.from_yaml(file) == TELESCOPIC_EXAMPLE

@@ -103,11 +103,14 @@ class Dialog:
                 self.complain(exc)
 
     def choose(self, prompt: str, *options: str) -> str:
-        """Return one of the options, of which the first is the default."""
+        """Return one of the options, of which the first is the default; its beginning is enough."""
         def read(given: str) -> str:
-            if given and given not in options:
-                raise StewartError(f'{given!r}: must be {" or ".join(options)}')
-            return given or options[0]
+            meant = [each for each in options if each.startswith(given)]
+            if given in options or not given:
+                meant = [given or options[0]]
+            if len(meant) != 1:
+                raise StewartError(f'{shown_name(given)}: must be {" or ".join(options)}')
+            return meant[0]
 
         return self.ask(f'{prompt} {" or ".join(options)}', options[0], read)
 
