@@ -9,7 +9,7 @@ SHELL := /bin/bash
   bench-replay bench-response clean demo demo-calibrate demo-cueing demo-identify demo-loop demo-mujoco demo-ship demo-tune docs docs-site export-demo installed \
   lint lint-flake8 lint-forms lint-layers lint-mypy lint-pep257 lint-ruff pytest test test-gpu test-release tools wheels
 
-# PYTHON=... chooses another one. The ROS wheels are built for these versions.
+# PYTHON=... chooses another one. The ROS wheels are built for these versions; the package admits 3.14, too.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
 SUITABLE := import ensurepip, sys, venv; sys.exit(not (3, 10) <= sys.version_info < (3, 14))
 
@@ -44,7 +44,8 @@ ifneq ($(VERSIONS),)
 ROS := none
 VENV_OPTIONS :=
 REQUIREMENTS := setup.py .ci/setup_requirements.py
-PYTHONS := $(or $(PYTHON),$(foreach version,$(if $(filter oldest,$(VERSIONS)),10 11 12 13,13 12 11 10), \
+SUITABLE := $(subst 14,15,$(SUITABLE))
+PYTHONS := $(or $(PYTHON),$(foreach version,$(if $(filter oldest,$(VERSIONS)),10 11 12 13 14,14 13 12 11 10), \
   python3.$(version) $(wildcard $(HOME)/.pyenv/versions/3.$(version).*/bin/python3.$(version))) python3)
 endif
 

@@ -22,6 +22,9 @@ except ImportError:  # before setuptools 70.1: colcon does without wheels
     from setuptools import Command as bdist_wheel
 
 package_name = 'stewart_dynamics'
+if sys.platform == 'win32':
+    raise SystemExit(f'{package_name}: Windows: not supported: it locks files as Unix does; in WSL 2 it '
+                     'installs as on Linux')
 share = f'share/{package_name}'
 
 # Read, not imported: where the package is built its dependencies need not be installed.
@@ -240,7 +243,7 @@ setup(
         (f'{share}/launch', sorted(glob('launch/*.launch.py'))),
         (f'{share}/security', sorted(glob('security/*'))),
     ],
-    python_requires='>=3.10,<3.14',
+    python_requires='>=3.10,<3.15',
     install_requires=install_requires,
     extras_require=extras_require,
     zip_safe=False,

@@ -13,6 +13,7 @@ import os
 from pathlib import Path
 import py_compile
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -249,6 +250,13 @@ def test_pip_puts_executables_on_the_path(wheel: Path, tmp_path: Path) -> None:
           '--prefix', tmp_path, wheel])
     assert {path.name for path in (tmp_path / 'bin').iterdir()} == set(EXECUTABLES)
     check_share(tmp_path / 'share')
+
+
+def test_windows_is_named_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip('setuptools.command.build_ext')  # not while the system is another one
+    monkeypatch.setattr(sys, 'platform', 'win32')
+    with pytest.raises(SystemExit, match='^stewart_dynamics: Windows: not supported: .* in WSL 2'):
+        runpy.run_path(str(ROOT / 'setup.py'))
 
 
 def test_no_module_has_the_name_of_one_of_python() -> None:
