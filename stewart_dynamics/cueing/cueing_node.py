@@ -80,7 +80,9 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._presence = 0.0  # of the vehicle's motion, from 0 to 1
         self._held: dict[str, float] = {}
         self._no_approach = ''  # the reason, where it does not start because of it
-        self._tried = False  # to find an approach, without success, since the last tick
+        # Whether an approach was not found since the last tick: looking for it takes longer than
+        # the period of fast legs.
+        self._tried = False
         self._ticks = 0
         self._due = 0  # index of the next setpoint, from the begin
         self._periods = DuePeriods(
@@ -131,7 +133,7 @@ class CueingNode(ManagedNode[CueingParameters]):
 
     def _on_legs(self, data: bytes) -> None:
         """Start the approach from where the platform stands."""
-        if not self._active or self._periods.begun or not self._now:
+        if not self._active or self._periods.begun or self._tried or not self._now:
             return
         platform = StewartPlatform(self._settings)
         try:
@@ -139,8 +141,6 @@ class CueingNode(ManagedNode[CueingParameters]):
             if not len(states.stamps):
                 if states.rejected:  # else a part: the others follow
                     self._rejections.reject(MEASURED_LEGS, *states.last)
-                return
-            if self._tried:  # an attempt takes longer than the period of fast legs
                 return
             positions = states.values[-1] + self._settings.geometry.zero_length
             away = np.abs(positions - platform.inverse_kinematics(self._cueing.governor.home))
