@@ -77,6 +77,24 @@ def test_a_motion_is_possible_with_each_change_and_not_with_less(
     assert ('lower' in words) == (name == 'hanging')
 
 
+@pytest.mark.parametrize(('size', 'expected'), [
+    (0.12, ['amplitude', 'height']), (0.5, ['amplitude'])])  # the larger one is singular as well
+def test_motions_of_cranks_are_changed_as_well(size: float, expected: list[str]) -> None:
+    platform = StewartPlatform.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
+    times, along, still = np.linspace(0.0, 10.0, 500), np.array([0.5, 0.0, 1.0]), np.zeros((
+        500, 3))
+    sine, cosine = (size * np.outer(each(times), along) for each in (np.sin, np.cos))
+    motion = Motion.from_euler(
+        platform.home_pose().position + sine, still, cosine, still, -sine, still)
+    recorded = RecordedMotion(times, motion, np.zeros((500, 6)), None, [])
+    found = judged(platform, recorded, uses(platform, recorded))
+    assert [each['change'] for each in found['possible_with']] == expected
+    for each in found['possible_with']:
+        for value, possible in ((each['value'], True), (
+                each['value'] + (0.02 if each['change'] == 'amplitude' else -0.005), False)):
+            assert is_possible(platform, recorded, each['change'], value) is possible
+
+
 def test_a_possible_motion_has_no_changes(recorded: RecordedMotion) -> None:
     platform = StewartPlatform(FILE)
     assert judged(platform, recorded, uses(platform, recorded))['possible_with'] == []

@@ -130,8 +130,7 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
             recorded.motion, np.zeros(3), wrench=recorded.wrench, base=recorded.base)
         payload = answer(more.value, more.limit, more.leg, joints)
     changes = [] if found['possible'] or recorded.mistakes else possible_changes(
-        platform, recorded, lambda each: is_possible(uses(platform, each)), found['factor'],
-        None if amplitude is None else amplitude['value'])
+        platform, recorded, lambda each: is_possible(uses(platform, each)))
     return found | {'between_setpoints': between, 'amplitude': amplitude, 'payload': payload,
                     'possible_with': changes}
 

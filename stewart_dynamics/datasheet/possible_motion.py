@@ -23,7 +23,7 @@ from stewart_dynamics.replay.recorded_motion import RecordedMotion
 
 SPEED, AMPLITUDE, HEIGHT = 'speed', 'amplitude', 'height'
 # Heights that are tried on either side, up to the height at home, and samples that are looked at
-# for each; all samples are checked at the height that is named.
+# for each change; all samples are checked at the value that is named.
 _HEIGHTS, _SAMPLES = 40, 400
 # Attempts at the next smaller value where the rounded one is not possible.
 _ATTEMPTS = 5
@@ -34,28 +34,22 @@ Check = Callable[[RecordedMotion], bool]
 
 
 def possible_changes(platform: StewartPlatform, recorded: RecordedMotion, check: Check,
-                     speed: float | None, amplitude: float | None) -> list[dict[str, Any]]:
+                     ) -> list[dict[str, Any]]:
     """
     Return changes of one number each with which a motion is possible, by the check itself.
 
     check: returns whether a motion is possible.
-    speed, amplitude: largest factors; None: not known.
 
     Each has ``change``, ``value`` (a factor, or a distance [m]) and ``words``.
     """
-    rows = recorded.motion.rows
+    few = _thinned(recorded)
     found = []
-    for change, factor, of, words in (
-            (AMPLITUDE, amplitude, _smaller(recorded.motion), 'at {:g} % of its amplitude'),
-            (SPEED, speed, lambda k: faster(rows, k), 'at {:g} % of its speed')):
-        if factor is not None and factor < 1.0:
-            percent = math.floor(100.0 * factor)
-            for each in range(percent, max(percent - _ATTEMPTS, 0), -1):
-                if check(recorded._replace(motion=Motion.of_rows(of(each / 100.0)))):
-                    found.append({'change': change, 'value': each / 100.0,
-                                  'words': words.format(each)})
-                    break
-    height = _nearest_height(platform, recorded, check)
+    for change, scaled in ((AMPLITUDE, _smaller(recorded.motion)), (SPEED, faster)):
+        percent = _largest_percent(scaled, recorded, few, check)
+        if percent:
+            found.append({'change': change, 'value': percent / 100.0,
+                          'words': f'at {percent} % of its {change}'})
+    height = _nearest_height(platform, recorded, few, check)
     if height is not None:
         found.append({'change': HEIGHT, 'value': height,
                       'words': f'from {_length(abs(height))} {_direction(platform, height)}'})
@@ -68,10 +62,24 @@ def in_words(changes: list[dict[str, Any]]) -> str:
     return last and f'possible {", ".join(first)}{", or " if first else ""}{last}'
 
 
-def _smaller(motion: Motion) -> Callable[[float], Array]:
-    """Return a function that returns rows of a motion that is smaller about its first pose."""
+def _smaller(motion: Motion) -> Callable[[Array, float], Array]:
+    """Return a function that makes rows of motion smaller about the first pose of a motion."""
     start = Motion(motion.position[0], motion.rotation[0])
-    return lambda factor: Deviations(start, motion.rows).at(factor)
+    return lambda rows, factor: Deviations(start, rows).at(factor)
+
+
+def _largest_percent(scaled: Callable[[Array, float], Array], recorded: RecordedMotion,
+                     few: RecordedMotion, check: Check) -> int:
+    """Return the largest percentage of a motion that is possible; 0 without one."""
+    def is_possible(percent: int, of: RecordedMotion) -> bool:
+        return check(of._replace(motion=Motion.of_rows(scaled(of.motion.rows, percent / 100.0))))
+
+    low, high = 0, 100
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if is_possible(middle, few) else (low, middle)
+    return next((percent for percent in range(low, max(low - _ATTEMPTS, 0), -1)
+                 if is_possible(percent, recorded)), 0)
 
 
 def _away(platform: StewartPlatform) -> tuple[Array, float]:
@@ -80,8 +88,8 @@ def _away(platform: StewartPlatform) -> tuple[Array, float]:
     return home.shape.axes[2] * home.side, abs(float(home.heights[0]))
 
 
-def _nearest_height(platform: StewartPlatform, recorded: RecordedMotion, check: Check,
-                    ) -> float | None:
+def _nearest_height(platform: StewartPlatform, recorded: RecordedMotion, few: RecordedMotion,
+                    check: Check) -> float | None:
     """Return the smallest shift along the axis of the hexapod that makes a motion possible [m]."""
     away, height = _away(platform)
 
@@ -90,7 +98,6 @@ def _nearest_height(platform: StewartPlatform, recorded: RecordedMotion, check: 
         rows[:, POSITION] += by * away
         return check(of._replace(motion=Motion.of_rows(rows)))
 
-    few = _thinned(recorded)
     for by in _heights(height):
         if moved(by, few):
             step = height / _HEIGHTS
