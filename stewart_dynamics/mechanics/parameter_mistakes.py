@@ -150,7 +150,7 @@ _BODY: Table[_Body] = First(
 
 
 class _File:
-    """A parameter file, and what hypotheses need of it, computed once."""
+    """A parameter file, with the numbers that several hypotheses need."""
 
     def __init__(self, p: Parameters) -> None:
         self.p, self.kind, self.leg, self.six = p, p.leg_kind, list(p.joints), Six(p)
@@ -175,7 +175,7 @@ class _File:
         self.texts = {name: _listed(np.unique(p[name])) for name in (
             'limits.force_max', 'limits.joint_force_max', 'limits.length_min',
             'limits.length_max', 'geometry.zero_length') if p[name] is not None}
-        # The rotors, and what they carry.
+        # Inertias of the rotors and of their loads.
         self.rotor = self.kind.fields['reflected_mass']
         self.reflected, reach = self.six[self.rotor], self.kind.reach(p)
         self.carried = (p.carried.mass + np.sum(p.legs.piston.mass)) / 6.0 * float(
@@ -189,7 +189,7 @@ class _File:
             self.reflected.min() > 0.0, self.reflected, np.nan)  # of the rotors alone
         self.start = reach * np.nan_to_num(
             self.six[self.kind.rate_limit]) / self.acceleration
-        # Of the legs, with all their force for a sixth of the platform.
+        # Largest acceleration of a leg with all its force, for a sixth of the platform.
         self.possible = np.full(6, _LARGEST_ACCELERATION / min(self.larger, 1.0))
         if self.weight <= self.force.sum():
             self.possible = np.minimum(self.possible, self.force / (

@@ -5,16 +5,18 @@
 Hypotheses about a file or a recording, and the search for those that are likely.
 
 A possible error is a hypothesis: its keyword or parameter, its evidence, its words. The evidence
-is computed from a subject, which holds the file or the data and what several hypotheses need of
-them, and is positive where the error is likely: a value above all that are known, or the
-logarithm of a ratio of misfits, of the data as given to those without the error (a transform of
-the data: another unit, sign, order, frame). An array is the evidence for each leg; the leg with
-the largest one is named. Numbers that are not known are nan, which is no evidence.
+is computed from a subject, which holds the file or the data and numbers that several hypotheses
+need, and is positive where the error is likely, as a value above all that are known. An array is
+the evidence for each leg; the leg with the largest one is named. Numbers that are not known are
+nan, which is no evidence.
 
 Rooms declare their hypotheses in tables, nested tuples in the order of the report. ``First``
 reports the first entry that finds anything, where later ones would follow from it; ``When``
 depends on a condition; a function finds the errors of another subject. A new possible error is
 one entry of a table.
+
+Hypotheses that exclude one another are transforms of the same data: another unit, sign, order or
+frame. ``likeliest`` compares their misfits, those of the data without the error.
 """
 
 from __future__ import annotations

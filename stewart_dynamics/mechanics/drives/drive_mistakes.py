@@ -72,7 +72,7 @@ class _Drives:
             self.peak / constant) ** 2 / (self.peak * self.fastest) / _LARGEST_HEAT)
         self.forward, self.back = drive.efficiency, drive.back_driving_efficiency
         self.usual_back = 2.0 - 1.0 / self.forward
-        # What the motors can do, and what the legs need.
+        # Limits of the motors at the legs, and limits of the legs.
         k, speed = motor_ratio(p), np.where(
             drive.speed_max is None, self.curve[-1, 0], self.fastest)
         torque = np.where(drive.torque_max is None, self.curve[:, 1].max(), self.peak)
@@ -126,7 +126,7 @@ _TABLE: Table[_Drives] = First(
         _Of('drive.back_driving_efficiency', lambda d: d.back - d.forward - _BACK, (
             '{back:g}, but drive.efficiency is {forward:g}: a drive that loses this much loses '
             'more when it is driven back (2 - 1 / efficiency is {usual_back:.3g}): exchanged?')),
-        # Of the thrust rating of a cylinder the rotors, not the rods, take most.
+        # Most of the thrust rating of a cylinder goes to the rotors.
         _Of('limits.force_max', lambda d: (
             d.pushed > _OF_A_CYLINDER * d.needed and d.p.limits.joint_force_max is None
             and d.p.limits.force_max is not None and d.reflected * (
