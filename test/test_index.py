@@ -149,8 +149,9 @@ def test_a_row_has_the_result_of_the_comparison_with_measured_forces(tmp_path: P
 
 
 def test_a_bag_without_numbers_has_empty_cells(tmp_path: Path) -> None:
-    nothing = summary([None] * 6, setpoints=UNANSWERED, singularity={
-        key: None if isinstance(value, float) else value for key, value in NEAR.items()})
+    nothing = summary([None] * 6, setpoints=UNANSWERED, singularity={**NEAR, **dict.fromkeys((
+        'determinant_nearest_m3', 'determinant_nearest_at_s', 'condition_max',
+        'condition_max_at_s'))})
     write_fleet(tmp_path, [row('none', 0, nothing, results='none'), row('bad', 2, None, 'why')])
     none, bad = table(tmp_path)
     assert (none['force_worst_n'], none['force_worst_leg'], none['condition_max']) == ('',) * 3
