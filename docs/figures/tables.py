@@ -23,6 +23,7 @@ from typing import Annotated, Any, get_args, get_origin
 from msgspec.json import schema_components
 from msgspec.structs import fields
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
+from stewart_dynamics.cueing.cueing_result import CueingResult
 from stewart_dynamics.legs import CRANK, KINDS
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
@@ -373,11 +374,11 @@ def summary_schema() -> str:
     return json.dumps({'anyOf': kinds, '$defs': records}, indent=1) + '\n'
 
 
-def summary_keys(*names: str) -> str:
-    """Return the table of keys of summary.json, with the keys in them."""
-    listed = {each.name: each for each in fields(of_kind(BagSummary, KINDS[0]))}
+def document_keys(record: type[Record], *names: str) -> str:
+    """Return the table of keys of a document, with the keys in them; without names of all."""
+    listed = {each.name: each for each in fields(of_kind(record, KINDS[0]))}
     return '\n'.join(['| key | type | meaning |', '| --- | --- | --- |', *(
-        row for name in names for row in _key_rows(name, listed[name].type))])
+        row for name in names or listed for row in _key_rows(name, listed[name].type))])
 
 
 def _key_rows(key: str, kind: Any) -> Iterator[str]:
@@ -449,13 +450,15 @@ def pages() -> dict[Path, dict[str, str]]:
         ROOT / 'docs' / 'motion_cueing.md': {
             'parameters of motion cueing': rows({
                 name: parameter for name, parameter in Parameters.table.items()
-                if name.startswith('cueing.')})},
+                if name.startswith('cueing.')}),
+            'keys of cueing.json': document_keys(CueingResult)},
         ROOT / 'docs' / 'cranks.md': {
             'parameters of cranks': rows({
                 name: parameter for name, parameter in Parameters.table.items()
                 if name.startswith(CRANK.own)})},
         ROOT / 'docs' / 'summary.md': {
-            f'keys of {group}': summary_keys(*names) for group, names in _SUMMARY.items()},
+            f'keys of {group}': document_keys(BagSummary, *names)
+            for group, names in _SUMMARY.items()},
         ROOT / 'docs' / 'simulator.md': {
             'errors in the loop': loop(figures), 'errors on a ship': ship(on_a_ship)},
         ROOT / 'docs' / 'identify_from_bags.md': {

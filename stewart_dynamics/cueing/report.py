@@ -11,18 +11,23 @@ demand back, and the response at the frequencies of the objective motion cueing 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.cueing.cueing_result import (
+    AxisResponse, CueingResult, Felt, Gain, Responses)
 from stewart_dynamics.cueing.motion_cueing import AXES, GRAVITY, MotionCueing, OMCT_FREQUENCIES
 from stewart_dynamics.cueing.recorded_vehicle import RecordedVehicle
 from stewart_dynamics.datasheet.motion_ratings import uses
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.program import SOFTWARE
 from stewart_dynamics.replay.recorded_motion import RecordedMotion
+from stewart_dynamics.whole_file import now
 
 USED = 0.9  # share of the limits that proposed gains use
 # Samples of a motion of which the use of limits is computed, evenly spaced.
@@ -88,33 +93,20 @@ def measured_response(cueing: MotionCueing) -> Array:
     return found
 
 
-def response_document(cueing: MotionCueing) -> dict[str, Any]:
+def responses(cueing: MotionCueing) -> Responses:
     """Return gains and phases, measured and analytic, and gains of the cross terms."""
     measured, analytic = measured_response(cueing), cueing.response(OMCT_FREQUENCIES)
     cross = cueing.cross_response(OMCT_FREQUENCIES)
-    found: dict[str, Any] = {'frequency_rad_s': OMCT_FREQUENCIES.tolist()}
+    found = {}
     for n, axis in enumerate(AXES):
         own = measured[:, n, n]
-        found[axis] = {
-            'gain': np.abs(own).tolist(), 'phase_deg': np.degrees(np.angle(own)).tolist(),
-            'analytic_gain': np.abs(analytic[axis]).tolist(),
-            'analytic_phase_deg': np.degrees(np.angle(analytic[axis])).tolist(),
-            'cross': {other: np.abs(measured[:, n, k]).tolist()
-                      for k, other in enumerate(AXES) if k != n},
-            'analytic_cross': {other: np.abs(cross[axis, other]).tolist()
-                               for other in AXES if (axis, other) in cross}}
-    return found
-
-
-class Gain(NamedTuple):
-    """A proposed gain and its reason."""
-
-    name: str  # of the parameter
-    place: int  # in its array
-    axis: str
-    before: float
-    value: float
-    reason: str
+        found[axis] = AxisResponse(
+            np.abs(own).tolist(), np.degrees(np.angle(own)).tolist(),
+            np.abs(analytic[axis]).tolist(), np.degrees(np.angle(analytic[axis])).tolist(),
+            {other: np.abs(measured[:, n, k]).tolist() for k, other in enumerate(AXES) if k != n},
+            {other: np.abs(cross[axis, other]).tolist()
+             for other in AXES if (axis, other) in cross})
+    return Responses(frequency_rad_s=OMCT_FREQUENCIES.tolist(), **found)
 
 
 def _gains(parameters: Parameters) -> Iterator[tuple[str, int, str]]:
@@ -186,30 +178,30 @@ def _with(parameters: Parameters, gains: Array) -> Parameters:
     return parameters.replaced(values)
 
 
-def document(parameters: Parameters, vehicle: RecordedVehicle, found: Cued,
-             used: Mapping[str, Array], response: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content of cueing.json that is not about the run."""
-    away = found.motion.position - MotionCueing(parameters).governor.home.position
+def cueing_result(path: Path, mistake: str | None, cueing: MotionCueing,
+                  vehicle: RecordedVehicle, found: Cued, used: Mapping[str, Array],
+                  gains: list[Gain]) -> CueingResult:
+    """Return the content of cueing.json."""
+    away = found.motion.position - cueing.governor.home.position
     turning = found.motion.angular_velocity
     duration = float(vehicle.times[-1])
-    return {
-        'duration_s': duration, 'samples': len(vehicle.times), 'notices': list(vehicle.notices),
-        'travel_m': {axis: [float(each.min()), float(each.max())]
-                     for axis, each in zip('xyz', away.T, strict=True)},
-        'angular_velocity_max_rad_s': np.abs(turning).max(axis=0).tolist(),
-        'largest_use': {name: float(each.max()) for name, each in used.items()},
-        'held_back_s': {name: each for name, each in found.held.items() if each > 0.0},
-        'demand_given': 1.0 - sum(found.held.values()) / duration,
-        'felt_of_wanted': {
-            axis: _correlation(found.wanted[:, n], found.felt[:, n])
-            for n, axis in enumerate(AXES)},
-        'response': dict(response)}
+    return CueingResult(
+        software=SOFTWARE, date=now(), vehicle=str(path), likely_mistake=mistake,
+        duration_s=duration, samples=len(vehicle.times), notices=list(vehicle.notices),
+        travel_m={axis: [float(each.min()), float(each.max())]
+                  for axis, each in zip('xyz', away.T, strict=True)},
+        angular_velocity_max_rad_s=np.abs(turning).max(axis=0).tolist(),
+        largest_use={name: float(each.max()) for name, each in used.items()},
+        held_back_s={name: each for name, each in found.held.items() if each > 0.0},
+        demand_given=1.0 - sum(found.held.values()) / duration,
+        felt_of_wanted={axis: _felt(found.wanted[:, n], found.felt[:, n])
+                        for n, axis in enumerate(AXES)},
+        response=responses(cueing), tuned=gains)
 
 
-def _correlation(wanted: Array, felt: Array) -> dict[str, float | None]:
+def _felt(wanted: Array, felt: Array) -> Felt:
     """Return the RMS of both, and their correlation; None where one is constant."""
     w, f = wanted - wanted.mean(), felt - felt.mean()
     size = float(np.sqrt((w ** 2).mean() * (f ** 2).mean()))
-    return {'wanted_rms': float(np.sqrt((w ** 2).mean())),
-            'felt_rms': float(np.sqrt((f ** 2).mean())),
-            'correlation': float((w * f).mean() / size) if size > 1e-12 else None}
+    return Felt(float(np.sqrt((w ** 2).mean())), float(np.sqrt((f ** 2).mean())),
+                float((w * f).mean() / size) if size > 1e-12 else None)

@@ -8,12 +8,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
 from stewart_dynamics.program import (
-    add_node, add_parameters, add_reading, add_report, DONE, PARTLY_READ, Program, SOFTWARE)
+    add_node, add_parameters, add_reading, add_report, DONE, PARTLY_READ, Program)
 from stewart_dynamics.signals import interrupt_on_signals
 from stewart_dynamics.tables.reading import Reading
+
+if TYPE_CHECKING:
+    from stewart_dynamics.cueing.cueing_result import CueingResult, Gain
 
 CUEING_FOLDER = 'cueing'
 _PROGRAM = Program('stewart_cueing_report', 'parameters or recording: nothing is written',
@@ -67,7 +70,6 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.reporting.results_folder import (
         check_free, CUEING, CUEING_PARAMETERS, MOTION_BAG, remove_abandoned, REPORT_PAGE,
         whole_folder)
-    from stewart_dynamics.whole_file import now
     from stewart_dynamics.whole_file import write_json
 
     interrupt_on_signals()
@@ -81,7 +83,7 @@ def _run(given: argparse.Namespace) -> int:
                               parameters.cueing.input)
     for text in (*vehicle.notices, *([f'vehicle: {mistake}'] if mistake else ())):
         _PROGRAM.complain(f'warning: {text}')
-    gains: list[report.Gain] = []
+    gains: list[Gain] = []
     chosen = parameters
     if given.tune and mistake:
         _PROGRAM.complain('warning: no gains are proposed from such a recording')
@@ -90,11 +92,7 @@ def _run(given: argparse.Namespace) -> int:
     cueing = MotionCueing(chosen)
     found = report.cued(cueing, vehicle)
     used = report.used_limits(chosen, vehicle.times, found.motion)
-    result = {
-        'software': SOFTWARE, 'date': now(), 'vehicle': str(given.vehicle),
-        'likely_mistake': mistake, **report.document(
-            chosen, vehicle, found, used, report.response_document(cueing)),
-        'tuned': [gain._asdict() for gain in gains]}
+    result = report.cueing_result(given.vehicle, mistake, cueing, vehicle, found, used, gains)
     with whole_folder(given.output, options, CUEING, before) as partial:
         write_json(partial / CUEING, result)
         write_setpoint_bag(partial / MOTION_BAG, vehicle.times, found.motion,
@@ -104,19 +102,18 @@ def _run(given: argparse.Namespace) -> int:
         if given.report:
             write_page(partial / REPORT_PAGE, result, vehicle.times, found, used)
     _PROGRAM.say(_text(result))
-    held = bool(result['held_back_s'])
+    held = bool(result.held_back_s)
     code = _PROGRAM.end(given.output, {given.vehicle: vehicle.missing}, given.strict and (
         held or bool(mistake)))
     assert code in (DONE, 1, PARTLY_READ)
     return code
 
 
-def _text(result: dict[str, object]) -> str:
-    used, held, gains = (result[name] for name in ('largest_use', 'held_back_s', 'tuned'))
-    assert isinstance(used, dict) and isinstance(held, dict) and isinstance(gains, list)
-    lines = [f'{result["duration_s"]:.1f} s, largest use: ' + ', '.join(
-        f'{name} {100.0 * value:.0f} %' for name, value in used.items())]
-    lines += [f'held back by {name} for {value:.3f} s' for name, value in held.items()]
-    lines += [f'{gain["name"]}, {gain["axis"].rpartition(" ")[2]}: {gain["before"]:g} -> '
-              f'{gain["value"]:g}: {gain["reason"]}' for gain in gains]
+def _text(result: CueingResult) -> str:
+    lines = [f'{result.duration_s:.1f} s, largest use: ' + ', '.join(
+        f'{name} {100.0 * value:.0f} %' for name, value in result.largest_use.items())]
+    lines += [f'held back by {name} for {value:.3f} s'
+              for name, value in result.held_back_s.items()]
+    lines += [f'{gain.name}, {gain.axis.rpartition(" ")[2]}: {gain.before:g} -> {gain.value:g}: '
+              f'{gain.reason}' for gain in result.tuned]
     return '\n'.join(lines)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.cueing.cueing_result import AxisResponse, CueingResult
 from stewart_dynamics.cueing.motion_cueing import AXES, OMCT_FREQUENCIES
 from stewart_dynamics.cueing.report import Cued
 from stewart_dynamics.reporting.pages import page
@@ -24,19 +24,18 @@ _PIECES = 600
 _UNITS = ('m/s²',) * 3 + ('rad/s',) * 3
 
 
-def write_page(path: Path, result: Mapping[str, Any], times: Array, found: Cued,
+def write_page(path: Path, result: CueingResult, times: Array, found: Cued,
                used: Mapping[str, Array]) -> None:
     """Write the page with the content of cueing.json."""
     text = page(_FOLDER, 'cueing', document=True, r=result, axes=AXES,
-                name=Path(result['vehicle']).name, felt=[
+                name=Path(result.vehicle).name, felt=[
                     over_time(times, found.wanted[:, n], found.felt[:, n],
                               f'{axis} [{_UNITS[n]}]') for n, axis in enumerate(AXES)],
                 used=_uses(float(times[-1]), used), response=[
-                    _bode(result['response'], axis) for axis in AXES],
-                cross=[(axis, other, max(values), max(
-                    result['response'][axis]['analytic_cross'].get(other, [0.0])))
-                    for axis in AXES for other, values
-                    in result['response'][axis]['cross'].items() if max(values) > 1e-3])
+                    _bode(axis, each) for axis, each in result.response.axes.items()],
+                cross=[(axis, other, max(values), max(each.analytic_cross.get(other, [0.0])))
+                       for axis, each in result.response.axes.items()
+                       for other, values in each.cross.items() if max(values) > 1e-3])
     write_files({path: text})
 
 
@@ -84,20 +83,19 @@ def _uses(duration: float, used: Mapping[str, Array]) -> str:
     return picture.svg()
 
 
-def _bode(response: Mapping[str, Any], axis: str) -> str:
+def _bode(axis: str, response: AxisResponse) -> str:
     """Return a picture of gain and phase over the frequency, measured and analytic."""
     picture = Picture(380, 330, f'response of {axis}')
     decades = np.log10(OMCT_FREQUENCIES)
-    each = response[axis]
     picture.text([14.0, 16.0], axis, css='view')
-    for top, key, title, analytic in (
-            (46.0, 'gain', 'gain', 'analytic_gain'),
-            (196.0, 'phase_deg', 'phase [deg]', 'analytic_phase_deg')):
-        values, exact = np.array(each[key]), np.array(each[analytic])
-        if key == 'phase_deg':
+    for top, title, *curves in (
+            (46.0, 'gain', response.gain, response.analytic_gain),
+            (196.0, 'phase [deg]', response.phase_deg, response.analytic_phase_deg)):
+        values, exact = map(np.array, curves)
+        if title != 'gain':
             exact = np.degrees(np.unwrap(np.radians(exact)))
             values = exact + (values - exact + 180.0) % 360.0 - 180.0
-        low, high = (0.0, max(1.0, 1.08 * float(values.max()))) if key == 'gain' else _range(
+        low, high = (0.0, max(1.0, 1.08 * float(values.max()))) if title == 'gain' else _range(
             values, exact)
         chart = Chart(picture, (54.0, top, 306.0, 96.0), (-1.05, 1.25), (low, high))
         for value in ticks(low, high, 4):
