@@ -16,7 +16,7 @@ from stewart_dynamics.replay.bag_summary import BagSummary
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
 
-# Of entries in lists.
+# Defaults of entries in lists.
 _ENTRIES = {'limits': {'setpoints': 1}, 'rejected': {'first': '', 'first_at_s': None}}
 
 
@@ -29,7 +29,7 @@ def motion_of(summary: Summary) -> dict[str, Any]:
 
 def bag_summary(summary: dict[str, Any] | None = None, parameters: Parameters | None = None,
                 **changes: Any) -> BagSummary:
-    """Return the summary with the keys of a document and others; what they lack is not known."""
+    """Return the summary with the keys of a document and others; the rest is not known."""
     parameters = parameters or symmetric_parameters()
     base = to_builtins(Summary(parameters).values())
     given = {**(summary or {}), **changes}
@@ -43,7 +43,7 @@ def bag_summary(summary: dict[str, Any] | None = None, parameters: Parameters | 
 
 
 def _filled(base: Any, given: Any) -> Any:
-    """Return a document with what it lacks taken from another one."""
+    """Return a document, with missing keys from another one."""
     if not isinstance(base, dict) or not isinstance(given, dict):
         return given
     if 'legs' in given:  # all as the first

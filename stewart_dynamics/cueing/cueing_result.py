@@ -13,10 +13,10 @@ Numbers = list[float]
 
 
 class Felt(Record):
-    """What is felt of the vehicle's motion, along or about an axis."""
+    """Demanded and achieved motion along or about an axis."""
 
     wanted_rms: Annotated[float, means('RMS of the demand about its mean [m/s^2 or rad/s]')]
-    felt_rms: Annotated[float, means('RMS of what is felt, likewise')]
+    felt_rms: Annotated[float, means('RMS of the achieved motion, likewise')]
     correlation: Annotated[Number, means('of both; null: one is constant')]
 
 
@@ -62,7 +62,7 @@ class Gain(Record):
 
 
 class CueingResult(Record):
-    """What cueing parameters make of a recorded motion."""
+    """The result of motion cueing for a recorded motion."""
 
     software: Annotated[str, means('name and version of the program that wrote the file')]
     date: Annotated[str, means('when')]

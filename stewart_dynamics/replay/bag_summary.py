@@ -436,7 +436,7 @@ class BagSummary(Record, kw_only=True):
     """
     The content of summary.json.
 
-    Of a motion without a bag, what depends on the bag has its default.
+    Keys that depend on the bag have their defaults for a motion without a bag.
     """
 
     version: Annotated[int, means('of these keys: 1')] = VERSION
