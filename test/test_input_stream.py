@@ -5,16 +5,26 @@
 
 from __future__ import annotations
 
+from hypothesis import given
+from hypothesis import strategies as st
 import messages
 from messages import MS, SECOND
 import numpy as np
-from referees import rng, symmetric_parameters
+from referees import rng, ROOT, symmetric_parameters
 
+from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.mechanics.frames.base_motion import row_of_motion, row_of_pose
 from stewart_dynamics.setpoints.input_messages import (
     BASE_ACCEL, BASE_POSE, BASE_TWIST, COMBINED, POSE, WRENCH)
+from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import MALFORMED
+from stewart_dynamics.setpoints.step import Batch, Step
 
+ANSWERING = {
+    name: Parameters.from_yaml(ROOT / 'config' / f'{file}.yaml').replaced(
+        {'setpoint.source': 'pose', **more}) for name, file, more in (
+            ('telescopic', 'platform', {}),
+            ('servos', 'crank_platform', {'servo.angle_at_min': -1.0, 'servo.angle_at_max': 1.0}))}
 TOPICS = (POSE, COMBINED, BASE_POSE, BASE_TWIST, BASE_ACCEL, WRENCH)
 
 
@@ -104,3 +114,35 @@ def test_mistakes_of_the_base_are_found_one_by_one_and_in_blocks() -> None:
     found = one.setpoints.mistakes(ever=True)
     assert BASE_TWIST in {each.topic for each in found}
     assert many.setpoints.mistakes(ever=True) == found
+
+
+@given(st.lists(st.tuples(st.integers(-400, 40), st.floats(-0.3, 0.3), st.booleans()),
+                min_size=1, max_size=30), st.sampled_from(sorted(ANSWERING)))
+def test_answers_in_the_call_that_completes_setpoints_are_those_of_the_step(
+        changes: list[tuple[int, float, bool]], name: str) -> None:
+    """Setpoints that turn, leave the reach and restart; some are held and answered later."""
+    parameters = ANSWERING[name]
+    step, written = Step(parameters), OutputMessages(parameters)
+    feed, batches, stamp = messages.Feed(parameters), list[Batch](), 40 * SECOND
+    published: list[dict[str, bytes]] = []
+    feed.setpoints.answer_setpoints(step, written, published.append)
+    home = StewartPlatform(parameters).home_pose().position
+    for passed, x, held in changes:
+        stamp += (passed or 1) * MS
+        half = 2.0 * x
+        feed.setpoints.hold_answers(held)
+        found = feed(POSE, messages.pose(
+            stamp, home + [x, 0.0, 3.0 * (x > 0.29)], (0.0, 0.0, np.sin(half), np.cos(half))))
+        if found is not None:
+            batches.append(found)
+            if held:
+                feed.setpoints.answer_setpoint(found)
+    if not batches:
+        return
+    outputs = step(Batch.joined(batches))
+    expected: list[dict[str, bytes]] = [{} for _ in outputs.stamps]
+    for topic, having, made in written.write_outputs(outputs):
+        for n in np.flatnonzero(having).tolist():
+            expected[n][topic] = made[n].tobytes()
+    assert published == expected
+    assert feed.setpoints.last_outputs().state.tobytes() == outputs.state.tobytes()

@@ -428,6 +428,8 @@ void put_memory(
   ((input_stream *)memory)->at = at;
 }
 
+void put_data(uint8_t * memory, const uint8_t * data) {((input_stream *)memory)->at.data = data;}
+
 static void answer_from(input_stream * stream, int64_t n, int64_t end) {
   const stream_memory * at = &stream->at;
   const message_rows * rows = &stream->answers;

@@ -262,6 +262,9 @@ void put_memory(
   double * base_restarts, stewart_output * outputs, uint8_t * messages, uint8_t * having,
   int64_t event_room, input_event * events, join_progress * progress);
 
+/* Other bytes of messages, which stay where they are. */
+void put_data(uint8_t * memory, const uint8_t * data);
+
 /* Join the messages in memory from progress->next on, and answer the setpoints that they complete.
    Answer the setpoints in memory. */
 void join_messages(uint8_t * memory);

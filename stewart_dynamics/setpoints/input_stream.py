@@ -181,14 +181,19 @@ class InputStream:
 
     def join_messages(self, messages: Messages) -> Joined:
         """Join messages of these and other topics, in recorded order."""
-        count, size = len(messages.times), len(messages.data)
-        if count > self._room[0] or size > self._room[1]:
-            self._reserve_memory(max(count, self._room[0]), max(size, self._room[1]))
+        count = len(messages.times)
+        if count > self._room[0]:
+            self._reserve_memory(count, self._room[1])
         numbers = np.array([self._numbers.get(topic, -1) for topic in messages.topics])
         self._places[:, :count] = (
             numbers[messages.of_topic], messages.times, messages.starts, messages.sizes)
-        self._data_bytes[:size] = messages.data
-        return self._join_placed(count, None)
+        own, self._data = self._data, messages.data.data  # not copied
+        function('put_data')(self._memory, messages.data)
+        try:
+            return self._join_placed(count, None)
+        finally:
+            function('put_data')(self._memory, self._data_bytes)
+            self._data = own
 
     def _join_placed(self, count: int, clock: Clock | None) -> Joined:
         """
