@@ -599,7 +599,7 @@ def test_a_changed_mass_is_judged_anew() -> None:
         found = legs.use_message(message, NO_WRENCH, None)
     assert found is not None and found.mistake is not None
     assert found.mistake.what == 'scale' and found.published is not None
-    legs.use(heavy, ExternalWrench(heavy))
+    legs.use_parameters(heavy, ExternalWrench(heavy))
     found = legs.use_message(last, NO_WRENCH, None)
     assert found is not None and found.mistake is None
 
@@ -641,13 +641,13 @@ class Followed:
             lambda rejection, details: self.rejected.append((rejection, details)),
             self.noticed.append)
 
-    def take(self, data: bytes) -> Estimate | None:
+    def use_message(self, data: bytes) -> Estimate | None:
         return self._legs.use_message(data, NO_WRENCH, TARGET, self.base)
 
     def rejects(self, data: bytes, reason: str, details: str) -> None:
         """Check that a message is rejected, for which reason and with which details."""
         many = len(self.rejected)
-        assert self.take(data) is None
+        assert self.use_message(data) is None
         assert len(self.rejected) == many + 1
         rejection, said = self.rejected[-1]
         assert rejection == (MEASURED_LEGS, reason)
