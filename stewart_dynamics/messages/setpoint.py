@@ -49,7 +49,7 @@ class StampedNumbers(NamedTuple):
 
 
 def read_message(kind: str, data: bytes) -> StampedNumbers:
-    """Return what a message of one of MESSAGE_TYPES says; MalformedError if it is none."""
+    """Return the contents of a message of one of MESSAGE_TYPES; MalformedError if it is not."""
     counts = _TYPES[kind][1]
     content: Any = np.zeros(1, record('message_content'))
     numbers = np.empty(sum(counts))

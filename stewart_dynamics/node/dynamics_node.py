@@ -209,7 +209,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         self._end_answers()
 
     def _end_answers(self) -> None:
-        """Publish what is due at a rate; gather the next setpoints if these have waited."""
+        """Publish topics with a rate; gather the next setpoints if these have waited."""
         self._publish_due(time.monotonic())
         rested, self._rested = self._rested, False
         if not rested:
@@ -234,7 +234,7 @@ class DynamicsNode(ManagedNode[Parameters]):
             self._answered = answered
 
     def _note_answer(self, setpoint: Batch, came: float) -> None:
-        """Note the answer to a single setpoint, or why it has none."""
+        """Note the answer to a single setpoint, or why it cannot be answered."""
         outputs = self._setpoints.last_outputs()
         if not len(outputs.stamps):
             for reason in unanswered(self._models.step.parameters, setpoint, outputs):

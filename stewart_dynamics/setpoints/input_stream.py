@@ -110,7 +110,7 @@ class InputStream:
         self._reserve_memory(1, _FEWEST_BYTES)
 
     def _reserve_memory(self, count: int, size: int) -> None:
-        """Make the memory of messages, and of what they complete."""
+        """Make the memory of messages, and of setpoints, samples and answers."""
         self._room = count, size
         self._data_bytes = np.empty(size, np.uint8)
         self._data = self._data_bytes.data

@@ -128,7 +128,7 @@ class Setpoints:
         return setpoints
 
     def _note_joined(self, joined: Joined, times: Stamps | None) -> Batch:
-        """Note what is joined for the checks; return the setpoints."""
+        """Note joined samples for the checks; return the setpoints."""
         if len(joined.base_stamps):
             self.base.note_samples(joined)
         if not len(joined.stamps):
