@@ -140,7 +140,8 @@ def test_the_demo_ends_with_how_far_the_platform_departs(demo: ModuleType) -> No
                                         (1.3, False, 3000.3), (1.3, True, 560.3))]
     assert demo.conclusion(runs, CRANK) == (
         'With the torques of the node the platform stays within 0.0022 mm of its motion, without '
-        'them within 2.4 mm;\nwith 30 % more payload than the node knows, within 0.56 mm and 3 mm.')
+        'them within 2.4 mm;\nwith 30 % more payload than the node knows, within 0.56 mm and '
+        '3 mm.')
 
 
 OPENED = """\

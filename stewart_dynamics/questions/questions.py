@@ -103,7 +103,7 @@ class Dialog:
                 self.complain(exc)
 
     def choose(self, prompt: str, *options: str) -> str:
-        """Return one of the options, of which the first is the default; its beginning is enough."""
+        """Return one of the options, named by its beginning; the first is the default."""
         def read(given: str) -> str:
             meant = [each for each in options if each.startswith(given)]
             if given in options or not given:
