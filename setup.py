@@ -23,8 +23,8 @@ except ImportError:  # before setuptools 70.1: colcon does without wheels
 
 package_name = 'stewart_dynamics'
 if sys.platform == 'win32':
-    raise SystemExit(f'{package_name}: Windows: not supported: it locks files as Unix does; in WSL 2 it '
-                     'installs as on Linux')
+    raise SystemExit(f'{package_name}: Windows: not supported: it locks files as Unix does; '
+                     'in WSL 2 it installs as on Linux')
 share = f'share/{package_name}'
 
 # Read, not imported: where the package is built its dependencies need not be installed.

@@ -101,7 +101,7 @@ def label_cells(app: Sphinx, doctree: nodes.document, docname: str) -> None:
 # Pages of files that stand elsewhere: written here for each build, and ignored by git.
 
 def write_pages(app: Sphinx, config: Config) -> None:
-    """Copy the notebooks to docs/notebooks/; write each release of CHANGELOG.rst to docs/releases/."""
+    """Copy notebooks to docs/notebooks/; write releases of CHANGELOG.rst to docs/releases/."""
     notebooks, releases = (ROOT / 'docs' / name for name in ('notebooks', 'releases'))
     for folder in (notebooks, releases):
         shutil.rmtree(folder, ignore_errors=True)

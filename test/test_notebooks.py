@@ -53,7 +53,8 @@ def test_a_notebook_prints_what_is_stored_in_it(path: Path) -> None:
     assert path.stat().st_size < LARGEST
     assert len(stored.cells) < 20
     again = nbformat.read(path, as_version=4)
-    client.NotebookClient(again, timeout=120, resources={'metadata': {'path': path.parent}}).execute()
+    client.NotebookClient(again, timeout=120,
+                          resources={'metadata': {'path': path.parent}}).execute()
     pairs = list(zip(printed(stored), printed(again), strict=True))
     assert sum(pictures for (_, pictures), _ in pairs) in (1, 2)
     for (before, pictures), (after, pictures_again) in pairs:
