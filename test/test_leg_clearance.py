@@ -359,6 +359,7 @@ def test_legs_that_become_parallel_far_away_do_not_end_a_travel() -> None:
             1e4 * Capability(near).travel(HOME, direction).value, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_no_pose_of_a_box_that_is_reachable_has_legs_too_near() -> None:
     limiting = 0
     for seed in (4, 5, 10, 24, 27):  # the last two with plates; others take up to 20 s each
