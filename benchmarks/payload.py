@@ -79,7 +79,7 @@ def measured(noise: tuple[float, float, float]) -> Callable[[int], LegHistory]:
                 strict=True):
             slow = memory * slow + new
             history.add_measurement(tuple((force + white + slow).tolist()),
-                        Estimate(stamp, tuple(row), None, None), NO_WRENCH)
+                                    Estimate(stamp, tuple(row), None, None), NO_WRENCH)
         return history
 
     return of_seed

@@ -215,7 +215,8 @@ def joined(given: dict[str, Any], found: list[tuple[str, int, bytes]], cuts: lis
             batches.append(take(topic, data, lambda at=at: at))
             setpoints.judge()
     else:
-        from_bytes: Any = getattr(Messages, 'from_bytes', None) or getattr(Messages, 'of')  # noqa: B009
+        build: Any = Messages
+        from_bytes = build.from_bytes if hasattr(build, 'from_bytes') else build.of
         whole = from_bytes(TOPICS, [TOPICS.index(each[0]) for each in found],
                            [each[1] for each in found], [each[2] for each in found])
         take = getattr(setpoints, 'join_messages', None) or setpoints.take

@@ -242,6 +242,7 @@ def test_many_entries_are_rejected_before_they_are_read(snapshot: Snapshot) -> N
     header = b'\0\1\0\0' + struct.pack('<iII4x', 0, 0, 1)
     entries = struct.pack('<I', many) + bytes(8 * many)
     no_name = struct.pack('<I', 0)
+
     def read_joints(data: bytes) -> None:
         read = JointStateReader(('leg_1',)).read_states(Messages.single('legs', data))
         assert read.last[0] == MALFORMED

@@ -96,7 +96,7 @@ def recorded(moves: Any, seconds: float = 10.0, rate: float = 500.0, noise: Nois
             np.rint(times * 1e9).astype(int).tolist(), rows.tolist(), forces.tolist(), bases,
             strict=True):
         history.add_measurement(tuple(force), Estimate(stamp, tuple(row), None, None, of_base),
-                    more.get('known', NO_WRENCH))
+                                more.get('known', NO_WRENCH))
     return history
 
 

@@ -191,5 +191,5 @@ def _decompressed(block: Messages) -> Iterator[Messages]:
         size += len(message)
         if size >= MOST_BYTES or n == len(block.times):
             yield Messages.from_bytes(block.topics, block.of_topic[first:n].tolist(),
-                              block.times[first:n].tolist(), messages)
+                                      block.times[first:n].tolist(), messages)
             messages, first, size = [], n, 0

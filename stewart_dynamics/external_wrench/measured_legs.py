@@ -180,7 +180,7 @@ class MeasuredLegs:
             self._efforts = EffortCheck(parameters)  # they may have been the mistake
 
     def use_message(self, data: bytes, known: Six, target: Target | None,
-             base: BaseInput | None = None) -> Estimate | None:
+                    base: BaseInput | None = None) -> Estimate | None:
         """
         Return the estimate from a sensor_msgs/JointState (CDR), or None where it is rejected.
 

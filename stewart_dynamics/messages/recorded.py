@@ -28,7 +28,7 @@ class Messages(NamedTuple):
 
     @classmethod
     def from_bytes(cls, topics: tuple[str, ...], of_topic: Sequence[int], times: Sequence[int],
-           messages: Sequence[bytes]) -> Messages:
+                   messages: Sequence[bytes]) -> Messages:
         """Join single messages."""
         sizes = np.array([len(message) for message in messages], dtype=np.int64)
         return cls(topics, np.array(of_topic, dtype=np.int64), np.array(times, dtype=np.int64),
