@@ -111,14 +111,14 @@ def write_pages(app: Sphinx, config: Config) -> None:
                          flags=re.MULTILINE)
     pages = {title.split()[0].lower(): f'{title}\n{"=" * len(title)}\n{text}'
              for title, text in zip(parts[::2], parts[1::2], strict=True)}
-    pages['index'] = '\n   '.join(['Releases\n========\n\n.. toctree::\n', *pages]) + '\n'
+    pages['overview'] = '\n   '.join(['Releases\n========\n\n.. toctree::\n', *pages]) + '\n'
     for name, text in pages.items():
         (releases / f'{name}.rst').write_text(text, encoding='utf-8')
 
 
 # Links lead to the files that GitHub shows; on the site these are included in pages.
 _PAGES = {
-    '../CHANGELOG.rst': 'releases/index.rst', '../CONTRIBUTING.md': 'contributing.md',
+    '../CHANGELOG.rst': 'releases/overview.rst', '../CONTRIBUTING.md': 'contributing.md',
     '../README.md': 'index.md', '../SECURITY.md': 'security_policy.md',
     '../benchmarks/README.md': 'performance.md', '../benchmarks/results/': 'results/',
     '../examples/notebooks/': 'notebooks/',
