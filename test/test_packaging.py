@@ -48,8 +48,9 @@ KEYS = {
     'scipy': 'python3-scipy', 'setuptools': 'python3-setuptools',
     'sphinx': 'python3-sphinx', 'tqdm': 'python3-tqdm',
     'websockets': '', 'yaml': 'python3-yaml', 'zstandard': ''}
-# Engines and readers of descriptions: tests that need them are skipped without them.
-ENGINES = {'pydrake', 'pytransform3d', 'urchin', 'yourdfpy'}
+# Engines and readers of descriptions, without which the tests that need them are skipped, and the
+# plugin of pytest for several processes.
+ENGINES = {'pydrake', 'pytransform3d', 'urchin', 'xdist', 'yourdfpy'}
 # Modules that are imported where an option asks for them, and the extra that brings them.
 OPTIONAL = {'argcomplete': 'completion', 'cupy': 'gpu', 'dask': 'cluster',
             'distributed': 'cluster', 'matplotlib': 'plot', 'mujoco': 'mujoco',
