@@ -37,7 +37,8 @@ from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
-from stewart_dynamics.messages.setpoint import pose
+from stewart_dynamics.messages.setpoint import read_message
+from stewart_dynamics.messages.type_names import POSE_STAMPED
 from stewart_dynamics.whole_file import write_files
 from tqdm import tqdm
 import yaml
@@ -148,7 +149,8 @@ class Recorder(Node):
         """Return the errors from a motion (N,) and its leg positions (N, 6) at its times."""
         states = {stamp_of(data): np.array(deserialize_message(data, JointState).position)
                   for data in self.states}
-        poses = {stamp: numbers for stamp, _, numbers in map(pose, self.poses)}
+        poses = {read.stamp: read.values
+                 for read in (read_message(POSE_STAMPED, data) for data in self.poses)}
         stamps = (BEGIN + times).tolist()
         missing = sum(stamp not in states or stamp not in poses for stamp in stamps)
         if missing:

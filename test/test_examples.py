@@ -27,7 +27,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from stewart_dynamics import approach, Capability, Motion, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.messages.setpoint import pose, StampedWriter, twist
+from stewart_dynamics.messages import type_names
+from stewart_dynamics.messages.setpoint import read_message, StampedWriter
 from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from trajectory_msgs.msg import JointTrajectory
@@ -398,7 +399,8 @@ def test_motion_compensation_keeps_the_platform_still_until_the_base_motion_stop
                for name, kind in kinds.items()}
     heard = {name: peer.listen(f'/stewart_dynamics/setpoint/{name}', kind)
              for name, kind in kinds.items()}
-    read = {'pose': pose, 'twist': twist, 'accel': twist}
+    types = {'pose': type_names.POSE_STAMPED, 'twist': type_names.TWIST_STAMPED,
+             'accel': type_names.ACCEL_STAMPED}
     # A loaded computer may be late: the timeout is long.
     program = run('motion_compensation.py', domain, '--ros-args', '-p', 'timeout:=5.0',
                   '-p', 'position:=[0.1, 0.0, 1.2]', '-p', 'angles:=[0.0, 0.1, 0.2]')
@@ -427,14 +429,16 @@ def test_motion_compensation_keeps_the_platform_still_until_the_base_motion_stop
         publish(2, base)
         publish(3, Motion([0.0, 0.0, 0.0], np.eye(3)))
         peer.until(lambda: all(len(answers(name)) == 2 for name in kinds), 'it answers')
-        for name, reader in read.items():
-            assert [reader(data).stamp for data in answers(name)] == [20_000_000, 30_000_000]
-            assert reader(answers(name)[0]).frame == b'base'
-        position = np.array(pose(answers('pose')[0]).values[:3])
+        read = {name: [read_message(kind, data) for data in answers(name)]
+                for name, kind in types.items()}
+        for messages in read.values():
+            assert [each.stamp for each in messages] == [20_000_000, 30_000_000]
+            assert messages[0].frame == b'base'
+        position = np.array(read['pose'][0].values[:3])
         world = base.position + base.rotation @ position
         np.testing.assert_allclose(world, [0.1, 0.0, 1.2], atol=1e-14)
         # The velocity of the platform in the world is zero.
-        velocity, spin = np.reshape(twist(answers('twist')[0]).values, (2, 3))
+        velocity, spin = np.reshape(read['twist'][0].values, (2, 3))
         np.testing.assert_allclose(
             base.rotation @ velocity + base.linear_velocity
             + np.cross(base.angular_velocity, base.rotation @ position), 0.0, atol=1e-14)

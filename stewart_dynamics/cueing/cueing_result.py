@@ -35,7 +35,7 @@ class AxisResponse(Record):
 class Responses(Record):
     """The responses of all axes."""
 
-    frequency_rad_s: Numbers
+    frequency_rad_s: Annotated[Numbers, means('of the objective motion cueing test')]
     surge: AxisResponse
     sway: AxisResponse
     heave: AxisResponse
@@ -55,10 +55,10 @@ class Gain(Record):
 
     name: Annotated[str, means('the parameter')]
     place: Annotated[int, means('in its array')]
-    axis: str
-    before: float
-    value: float
-    reason: str
+    axis: Annotated[str, means('part of motion cueing, and axis')]
+    before: Annotated[float, means('gain of the file')]
+    value: Annotated[float, means('proposed gain')]
+    reason: Annotated[str, means('the limit that ends its growth')]
 
 
 class CueingResult(Record):

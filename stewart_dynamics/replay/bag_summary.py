@@ -46,9 +46,9 @@ class Inputs(Record):
 class Rejected(Record):
     """Messages or setpoints that were not answered."""
 
-    topic: str
-    reason: str
-    count: int
+    topic: Annotated[str, means('topic of the node')]
+    reason: Annotated[str, means('why they were not answered')]
+    count: Annotated[int, means('number of messages or setpoints')]
     first: Annotated[str, means('details of the first of them')]
     first_at_s: Annotated[Number, means(
         'when the first of them was, by its stamp or else by its time of recording; null: not '
@@ -312,8 +312,8 @@ class ExternalWrench(Record):
 class Mistake(Record):
     """A possible error in the messages."""
 
-    topic: str
-    text: str
+    topic: Annotated[str, means('topic of the node')]
+    text: Annotated[str, means('the mistake, with its size and likely cause')]
     first_at_s: Annotated[Number, means('when it begins; null if stamps jumped back')]
 
 
@@ -354,11 +354,11 @@ class EffortsMistake(Record):
 class Contact(Record):
     """An interval in which an external load acted on the platform."""
 
-    from_s: float
-    to_s: float
+    from_s: Annotated[float, means('begin')]
+    to_s: Annotated[float, means('end')]
     axis: Annotated[str, means('the component with the largest excess')]
-    force_n: list[float]
-    moment_n_m: list[float]
+    force_n: Annotated[list[float], means('largest deviation of the force from its median')]
+    moment_n_m: Annotated[list[float], means('likewise of the moment')]
 
 
 class Contacts(Record):
@@ -371,8 +371,7 @@ class Contacts(Record):
         "deviations, at least 0.001 of the leg forces' RMS")]
     resolution_s: Annotated[float, means('uncertainty of the times')]
     strongest: Annotated[list[Contact], means(
-        'up to 100, in order of time: `force_n` and `moment_n_m` of the external wrench minus its '
-        'median: a load of more than half of the time is a payload')]
+        'up to 100, in order of time; a load of more than half of the time is a payload')]
 
 
 class Measured(Record):
@@ -418,7 +417,7 @@ class UncertainLeg(Record):
 class UncertainLimit(Record):
     """A limit of loads or motors that is given."""
 
-    limit: str
+    limit: Annotated[str, means('name of the parameter')]
     hexapods: Annotated[int, means('hexapods of which a leg exceeds it anywhere')]
     share: Annotated[float, means('their share')]
 

@@ -18,9 +18,9 @@ Bounds = Annotated[tuple[Number, Number], means(
 class SecondOrder(Record):
     """A drive of second order behind a delay."""
 
-    gain: float
+    gain: Annotated[float, means('of slow motion')]
     delay: Annotated[float, means('[s]')]
-    damping: float
+    damping: Annotated[float, means('damping ratio')]
     natural_frequency: Annotated[float, means('[Hz]')]
 
 
