@@ -17,7 +17,6 @@ import secrets
 import stat
 from typing import Any
 
-from msgspec import Struct, to_builtins
 from stewart_dynamics.errors import shown, StewartError
 from stewart_dynamics.signals import signals_wait
 
@@ -206,8 +205,18 @@ def to_json(document: Any, indent: int | None = None) -> str:
     """
     # Not orjson: it writes null for NaN, and takes no names that are not UTF-8.
     return json.dumps(
-        to_builtins(plain(document)), indent=indent, allow_nan=False, ensure_ascii=False,
-        separators=None if indent else (',', ':'))
+        plain(document), indent=indent, allow_nan=False, ensure_ascii=False,
+        separators=None if indent else (',', ':'), default=_by_keys)
+
+
+def _by_keys(document: Any) -> dict[str, Any]:
+    """Return the values of a record by their keys."""
+    from stewart_dynamics.records import Record
+
+    if not isinstance(document, Record):
+        raise TypeError(f'Object of type {type(document).__name__} is not JSON serializable')
+    return {key: getattr(document, name) for key, name in zip(
+        document.keys(), document.__struct_fields__, strict=True)}
 
 
 def plain(document: Any) -> Any:
@@ -217,12 +226,14 @@ def plain(document: Any) -> Any:
     All that goes into JSON or onto a page passes here: an array has no truth value, and neither
     a template nor JSON takes all of numpy's scalars.
     """
-    import numpy as np  # late, so that --help is fast
+    # late, so that --help is fast
+    import numpy as np
 
-    if isinstance(document, Struct):
+    from stewart_dynamics.records import Record
+
+    if isinstance(document, Record):
         return type(document)(**{name: plain(getattr(document, name))
                                  for name in document.__struct_fields__})
-
     if isinstance(document, (np.generic, np.ndarray)):
         return document.tolist()
     if isinstance(document, Mapping):
