@@ -404,7 +404,7 @@ def test_every_setpoint_keeps_its_base_and_a_still_base_stays_still() -> None:
     assert done.bases is not None
     assert np.array_equal(done.bases, batch.bases)
     still = Differentiator(10.0, 0.1)
-    still.add(Batch.of(batch.stamps, batch.motions))
+    still.add_setpoints(Batch.of(batch.stamps, batch.motions))
     assert still.finish().bases is None
 
 
