@@ -261,10 +261,10 @@ def test_the_tilt_of_a_base_is_found_within_its_interval(
     written = tmp_path / 'found' / 'identified.yaml'
     assert _degrees_between(
         StewartPlatform.from_yaml(written).parameters['gravity'], TILTED['gravity']) < 0.02
-    lines = written.read_text().splitlines()
-    (place,) = [n for n, each in enumerate(lines) if 'gravity:' in each]
-    line = lines[place - 1]  # a comment above: behind the value it would be too long
-    assert f'# m/s^2; identified {result["date"][:10]}, 95 %: turned about x by 0.0200' in line
+    # A comment above: behind the value it would be too long.
+    above, _ = written.read_text().split('    gravity:')
+    line = ' '.join(each.strip('# ') for each in above.splitlines()[-3:])
+    assert f'm/s^2; identified {result["date"][:10]}, 95 %: turned about x by 0.0200' in line
     assert ' rad, turned about y by 0.016' in line
 
 
