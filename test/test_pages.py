@@ -82,8 +82,9 @@ def test_the_simulator_s_topics_are_those_of_the_code() -> None:
 
 def test_the_readme_has_the_figures_of_its_demo() -> None:
     figures = json.loads((ROOT / 'docs' / 'figures' / 'loop.json').read_text(encoding='utf-8'))
-    alone, forward = (run['peak']['position'] / 1e3 for run in figures['runs'][:2])
-    assert f'by {alone:.1f} mm, with them by {forward:.3f} mm' in ' '.join(README.split())
+    alone, forward, _, heavier = (run['peak']['position'] / 1e3 for run in figures['runs'])
+    assert (f'by {alone:.1f} mm, with them by {forward:.3f} mm, and by {heavier:.2f} mm with a '
+            'payload that is 30 % heavier') in ' '.join(README.split())
 
 
 def test_the_example_of_the_readme_runs(

@@ -324,7 +324,7 @@ def test_the_report_shows_what_is_wrong_with_a_bag(tmp_path: Path) -> None:
                  12.25),
                 ('quaternion', 1, 'length 1.01, must be within 0.001 of 1', None))])
     text = text_of(tmp_path / 'report.html')
-    for shown in ('The bag could not be read completely', 'chunk 3: its CRC is wrong',
+    for shown in ('Results are incomplete', 'chunk 3: its CRC is wrong',
                   'not finite', '1\u202f234',
                   'Limits are exceeded', 'limits.force_max', 'A singularity is reached',
                   'det(J) crossed zero at', 'the bag has no checksums', 'reflected_mass',

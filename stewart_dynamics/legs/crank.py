@@ -469,7 +469,8 @@ class Crank(LegKind):
             raise ParameterError(
                 f'{parameters.source}: geometry.crank_branch: auto: {parameters.joints[leg]} has '
                 f'an angle of {up:.4g} rad at home with the branch positive, {down:.4g} rad with '
-                f'negative: {words}: give the branch, or limits of the angle')
+                f'negative: {words}: give the branch, or limits.angle_min and '
+                'limits.angle_max')
         of['branch'] = hexapod['legs']['branch']
         return True
 

@@ -36,10 +36,10 @@ LEVELS = ('none', 'good', 'warn', 'bad')  # the worst last; the first: informati
 _CARDS = {
     (READING, MISSING, REJECTED): {
         'good': 'The whole bag was read', 'warn': 'Not all messages could be used',
-        'bad': 'The bag could not be read completely'},
+        'bad': 'Results are incomplete'},
     (INPUTS,): {'none': 'Inputs', 'bad': 'Inputs contradict each other or the parameters'},
     (LIMITS, MOTOR_LIMITS): {
-        'none': 'No limits are given', 'good': 'All limits are held',
+        'none': 'No limits were checked', 'good': 'All limits are held',
         'warn': 'It is not proven that limits are held', 'bad': 'Limits are exceeded'},
     (SINGULARITY,): {'none': 'Singularity', 'good': 'Clear of singularities',
                      'warn': 'A singularity is near', 'bad': 'A singularity is reached'},
@@ -139,7 +139,7 @@ def _answered(points: Setpoints, efforts: str) -> Iterator[Statement]:
 
 def _messages(summary: BagSummary) -> Iterator[Statement]:
     for part in summary.missing:
-        yield Statement(MISSING, 'bad', f'not read: {part}')
+        yield Statement(MISSING, 'bad', f'missing: {part}')
     rejected = sorted(summary.rejected, key=lambda each: -each.count)
     for each in rejected[:_LISTED]:
         yield Statement(REJECTED, 'warn', Rejection(each.topic, each.reason).counted(
