@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import json
 from pathlib import Path
+import pickle
 
 import numpy as np
 import pytest
@@ -143,6 +144,21 @@ def test_the_wrench_of_parts_is_that_of_whole_messages(split: str, stagger: int)
     assert not any(each.mistake for each in found)
     # staggered stamps of values that were taken at once are off by up to 1.5 ms
     assert max(each.force for each in found[20:]) < (80.0 if stagger else 20.0)
+
+
+def test_parts_that_never_join_are_dropped_in_the_end() -> None:
+    """A stamp in the far future of one leg: the others have none to be joined with."""
+    reader = JointStateReader(JOINTS, ['effort'])
+    first, others = JointStateWriter(JOINTS[:1]), JointStateWriter(JOINTS[1:])
+    samples_of(reader, first.write((2 ** 31 - 1) * 10 ** 9, *([0.0],) * 3))
+
+    sizes = []
+    for begin in (0, 15_000, 30_000):
+        for k in range(begin, begin + 15_000):
+            assert samples_of(reader, others.write(
+                BEGIN + k * PERIOD, *([0.0] * 5,) * 3)) == []
+        sizes.append(len(pickle.dumps(reader._parts)))
+    assert sizes[2] == sizes[1] < 1.01 * sizes[0]
 
 
 def test_parts_without_stamps_are_rejected() -> None:

@@ -108,3 +108,18 @@ def test_terminal_and_page_say_with_which_changes_a_motion_is_possible(
     words = 'possible at 9 % of its amplitude, or from 93 mm higher'
     assert words in ' '.join(capsys.readouterr().out.split())
     assert words in (tmp_path / 'out' / 'datasheet.html').read_text()
+
+
+def test_a_motion_of_more_than_half_a_turn_has_no_smaller_amplitude() -> None:
+    """Its rotation vectors jump: a part of them would be another motion."""
+    seconds = np.linspace(0.0, 10.0, 1001)
+    yaw = 2.0 * np.pi * seconds / 10.0
+    still = np.tile([0.0, 0.0, 1.1], (1001, 1))
+    turning = RecordedMotion(
+        seconds, Motion.from_euler(
+            still, np.outer(yaw, [0.0, 0.0, 1.0]), 0.0 * still,
+            np.tile([0.0, 0.0, 0.2 * np.pi], (1001, 1))), np.zeros((1001, 6)), None, [])
+    platform = StewartPlatform(FILE)
+    found = judged(platform, turning, uses(platform, turning))
+    assert not found['possible']
+    assert 'amplitude' not in [each['change'] for each in found['possible_with']]

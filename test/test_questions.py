@@ -207,3 +207,22 @@ def test_help_needs_no_numpy() -> None:
             'except SystemExit: print("numpy" in sys.modules)')
     done = subprocess.run(['python3', '-c', code], capture_output=True, text=True, timeout=300)
     assert done.stdout.endswith('False\n')
+
+
+def test_an_answer_without_numbers_is_asked_again(tmp_path: Path) -> None:
+    done = answer(tmp_path, *BEGIN, ',', *KEPT)
+    assert done.returncode == 0
+    assert done.stderr.count('\n') == 1
+    assert 'must be a single double' in done.stderr
+
+
+def test_a_file_that_cannot_be_written_is_named_before_the_questions(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('')
+    (tmp_path / 'folder.yaml').mkdir()
+    for name in ('file/hexapod.yaml', 'folder.yaml'):
+        done = answer(tmp_path, *BEGIN, *KEPT, arguments=(name,))
+        assert done.returncode == 2
+        assert done.stdout == ''
+        assert done.stderr.count('\n') == 1
+        assert name.partition('/')[0] in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['file', 'folder.yaml']

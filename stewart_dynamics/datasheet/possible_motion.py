@@ -45,6 +45,8 @@ def possible_changes(platform: StewartPlatform, recorded: RecordedMotion, check:
     few = _thinned(recorded)
     found = []
     for change, scaled in ((AMPLITUDE, _smaller(recorded.motion)), (SPEED, faster)):
+        if scaled is None:
+            continue
         percent = _largest_percent(scaled, recorded, few, check)
         if percent:
             found.append({'change': change, 'value': percent / 100.0,
@@ -62,9 +64,16 @@ def in_words(changes: list[dict[str, Any]]) -> str:
     return last and f'possible {", ".join(first)}{", or " if first else ""}{last}'
 
 
-def _smaller(motion: Motion) -> Callable[[Array, float], Array]:
-    """Return a function that makes rows of motion smaller about the first pose of a motion."""
+def _smaller(motion: Motion) -> Callable[[Array, float], Array] | None:
+    """
+    Return a function that makes rows of motion smaller about the first pose of a motion.
+
+    None: the motion turns by half a turn or more from there, where rotation vectors jump.
+    """
     start = Motion(motion.position[0], motion.rotation[0])
+    turns = Deviations(start, motion.rows).changes[:, 0, 3:]
+    if (np.linalg.norm(np.diff(turns, axis=0), axis=1) > np.pi).any():
+        return None
     return lambda rows, factor: Deviations(start, rows).at(factor)
 
 

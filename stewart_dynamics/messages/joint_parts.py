@@ -20,6 +20,8 @@ from stewart_dynamics.messages.stamp_order import NO_STAMP, Order, order_of
 GAP = SECOND // 10
 """Default of the longest time between two samples of a joint [ns]."""
 
+_KEPT = 10_000  # samples of a joint, where those of another one never come
+
 Sample = tuple[int, tuple[Any, ...]]
 """Stamp [ns], and the values of all joints in one field, then in the next."""
 
@@ -47,9 +49,9 @@ class JointParts:
 
     def _clear(self) -> None:
         # The samples of each joint from the last one on that is not newer than all joined ones.
-        self._series: list[deque[Sample]] = [deque() for _ in self._joints]
+        self._series: list[deque[Sample]] = [deque(maxlen=_KEPT) for _ in self._joints]
         self._leader = -1  # the joint whose stamps are those of the samples
-        self._due: deque[int] = deque()  # its stamps that are not joined yet
+        self._due: deque[int] = deque(maxlen=_KEPT)  # its stamps that are not joined yet
 
     def join_part(self, stamp: int, joints: Sequence[int], values: Sequence[float]) -> Joined:
         """

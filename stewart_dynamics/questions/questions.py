@@ -87,10 +87,15 @@ class Dialog:
         while True:
             try:
                 given = input(f'{prompt} ({default}): ')
-            except EOFError:
+            except (EOFError, RuntimeError):  # the latter without a standard input
                 print(flush=True)
                 raise StewartError(
                     f'the input ended before the answer to {prompt!r}; nothing is written'
+                ) from None
+            except UnicodeDecodeError as exc:
+                print(flush=True)
+                raise StewartError(
+                    f'standard input: {exc.reason}: not {exc.encoding} text; nothing is written'
                 ) from None
             except KeyboardInterrupt:
                 print(flush=True)
@@ -192,7 +197,7 @@ class _Question:
                 return None
             numbers = [self._unit.to_table(number(each))
                        for each in given.replace(',', ' ').split()]
-            checked(parameter, numbers if parameter.sizes or len(numbers) > 1 else numbers[0],
+            checked(parameter, numbers if parameter.sizes or len(numbers) != 1 else numbers[0],
                     'answer')
             return np.array(numbers) if parameter.sizes else numbers[0]
 

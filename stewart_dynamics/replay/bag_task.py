@@ -99,7 +99,10 @@ def kept(task: Task) -> Ended | None:
     made_of = fingerprint(task.bag, task.parameters, task.options)
     if not made_of or summary.fingerprint != made_of:
         return None
-    return _outcome(task, summary)._replace(kept=True)
+    try:
+        return _outcome(task, summary)._replace(kept=True)
+    except (ArithmeticError, LookupError, TypeError, ValueError):
+        return None  # its values are not those of a replay
 
 
 def _summary_of(task: Task) -> BagSummary | None:
@@ -108,7 +111,7 @@ def _summary_of(task: Task) -> BagSummary | None:
         text = (task.folder / RESULT).read_text(encoding='utf-8')
         summary = record_of(BagSummary, json.loads(text), task.parameters.leg_kind)
         return summary if summary.version == VERSION and summary.fingerprint else None
-    except (OSError, ValueError):
+    except (OSError, RecursionError, SystemError, ValueError):  # of another program, or spoiled
         return None
 
 

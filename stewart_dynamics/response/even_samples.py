@@ -34,6 +34,7 @@ _FROZEN, _MOVED, _MOST = 3, 1e-3, 0.5
 SHORTEST = 64
 # Difference between the clocks of two sources from which on it is noticed [s].
 _CLOCKS = 0.01
+_EARLY = 1e-6  # shorter negative delays are rounding errors [s]
 
 
 class Track(NamedTuple):
@@ -163,7 +164,7 @@ def clock_notices(commanded: Track, achieved: Track, name: str, delays: Sequence
             f'{name}: recorded {achieved.late * 1e3:.3g} ms after their stamps, setpoints '
             f'{commanded.late * 1e3:.3g} ms: if clocks differ by these {off * 1e3:.3g} ms, '
             'delays are wrong by them')
-    if delays and min(delays) < 0.0:
+    if delays and min(delays) < -_EARLY:
         notices.append(f'{name}: {-1e3 * min(delays):.3g} ms earlier than the setpoints: the '
                        'clocks of their stamps differ, or setpoints are stamped late')
     if drift is not None:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Integers, SECOND, Six, Stamps
+from stewart_dynamics.arrays import Array, Bytes, Integers, SECOND, Six, Stamps
 from stewart_dynamics.core.binding import CODES, function, record
 from stewart_dynamics.mechanics.rows import BASE
 from stewart_dynamics.messages.layout import MessageRows
@@ -48,7 +48,7 @@ _DONE, _CLOCK = CODES['JOIN_DONE'], CODES['JOIN_CLOCK']
 # Places of join_progress as integers.
 _COUNT, _NEXT, _N_SETPOINTS, _N_BASES, _N_EVENTS, _STATUS, _TIMED, _HELD = range(8)
 _EVENTS = 8192
-_FEWEST_BYTES = 4096  # of the memory of messages
+_MOST_BYTES = 4096  # of a message that is copied
 
 
 class Joined(NamedTuple):
@@ -107,12 +107,12 @@ class InputStream:
         self._join = function('join_messages').bound(self._memory)
         self._answer = function('answer_setpoints').bound(self._memory)
         self._answers: tuple[Step, MessageRows, Callable[[dict[str, bytes]], object]] | None = None
-        self._reserve_memory(1, _FEWEST_BYTES)
+        self._reserve_memory(1)
 
-    def _reserve_memory(self, count: int, size: int) -> None:
+    def _reserve_memory(self, count: int) -> None:
         """Make the memory of messages, and of setpoints, samples and answers."""
-        self._room = count, size
-        self._data_bytes = np.empty(size, np.uint8)
+        self._room = count
+        self._data_bytes = np.empty(_MOST_BYTES, np.uint8)
         self._data = self._data_bytes.data
         self._places: Integers = np.zeros((4, count), np.int64)  # topics, times, starts, sizes
         self._first_place = self._places.data  # as integers that are set fast
@@ -139,7 +139,7 @@ class InputStream:
         """
         self._answers = step, messages.rows, publish
         function('put_answers')(self._memory, step.hexapod, self._state, *messages.rows.arguments)
-        self._reserve_memory(*self._room)
+        self._reserve_memory(self._room)
 
     def hold_answers(self, held: bool) -> None:
         """Complete setpoints without an answer, until ``answer_setpoint``."""
@@ -172,28 +172,31 @@ class InputStream:
     def join_message(self, topic: str, data: bytes, clock: Clock) -> Joined:
         """Join one message; without arrays, which would take longer than all else."""
         size, place = len(data), self._first_place
-        if size > self._room[1]:
-            self._reserve_memory(self._room[0], 2 * size)
-            place = self._first_place
         place[0, 0], place[1, 0], place[2, 0], place[3, 0] = self._numbers[topic], 0, 0, size
+        if size > _MOST_BYTES:  # no message makes the memory larger
+            return self._join_there(np.frombuffer(data, np.uint8), 1, clock)
         self._data[:size] = data
         return self._join_placed(1, clock)
 
     def join_messages(self, messages: Messages) -> Joined:
         """Join messages of these and other topics, in recorded order."""
         count = len(messages.times)
-        if count > self._room[0]:
-            self._reserve_memory(count, self._room[1])
+        if count > self._room:
+            self._reserve_memory(count)
         numbers = np.array([self._numbers.get(topic, -1) for topic in messages.topics])
         self._places[:, :count] = (
             numbers[messages.of_topic], messages.times, messages.starts, messages.sizes)
-        own, self._data = self._data, messages.data.data  # not copied
-        function('put_data')(self._memory, messages.data)
+        return self._join_there(messages.data, count, None)
+
+    def _join_there(self, data: Bytes, count: int, clock: Clock | None) -> Joined:
+        """Join messages whose places are in memory where their bytes are, without a copy."""
+        self._data = data.data
+        function('put_data')(self._memory, data)
         try:
-            return self._join_placed(count, None)
+            return self._join_placed(count, clock)
         finally:
             function('put_data')(self._memory, self._data_bytes)
-            self._data = own
+            self._data = self._data_bytes.data  # also if `publish` has changed the memory
 
     def _join_placed(self, count: int, clock: Clock | None) -> Joined:
         """

@@ -51,7 +51,7 @@ class Rejection(NamedTuple):
 
 
 STAMP_ZERO = 'stamp 0'  # details of a message that is joined in order of arrival
-_STAMP = re.compile(r'stamp (\d+) ns(: | is )?')
+_STAMP = re.compile(r'stamp (-?\d+) ns(: | is )?')
 
 
 def stamp_words(stamp: int) -> str:
@@ -112,4 +112,5 @@ class Rejections:
 def frame_details(frame: bytes, wanted: bytes) -> str:
     """Return the details for WRONG_FRAME."""
     given, must = (each[:60].decode(errors='replace') for each in (frame, wanted))
-    return f'{given!r}, must be {must!r} or empty'
+    lengths = f' ({len(frame)} and {len(wanted)} bytes)' if given == must else ''
+    return f'{given!r}, must be {must!r} or empty{lengths}'
