@@ -29,8 +29,8 @@ FILES = {'telescopic': 'platform.yaml', 'crank': 'crank_platform.yaml'}
 # Double-precision instructions a second of an H100 SXM or H200: 132 multiprocessors with 64 units
 # at 1.98 GHz (NVIDIA H100 Tensor Core GPU Architecture, 2022: 33.5 TFLOP/s of fused products).
 INSTRUCTIONS = 132 * 64 * 1.98e9
-# Of a division and of a square root, in double precision: a reciprocal from a table of single
-# precision, two iterations, and the correction of the last digit.
+# Instructions of a division and of a square root, in double precision: a reciprocal from a table
+# of single precision, two iterations, and the correction of the last digit.
 OF_DIVISION, OF_ROOT = 8, 8
 
 NUMBER = r"""

@@ -147,7 +147,7 @@ def test_the_wrench_of_parts_is_that_of_whole_messages(split: str, stagger: int)
 
 
 def test_parts_that_never_join_are_dropped_in_the_end() -> None:
-    """A stamp in the far future of one leg: the others have none to be joined with."""
+    """A stamp in the far future of one leg: the others have nothing to be joined with."""
     reader = JointStateReader(JOINTS, ['effort'])
     first, others = JointStateWriter(JOINTS[:1]), JointStateWriter(JOINTS[1:])
     samples_of(reader, first.write((2 ** 31 - 1) * 10 ** 9, *([0.0],) * 3))

@@ -51,7 +51,7 @@ def _file(text: str) -> Path:
 
 
 def _check_writable(folder: Path, names: Sequence[str]) -> None:
-    """Raise OSError where files cannot be written: a name is a folder, or the folder is none."""
+    """Raise OSError where files cannot be written: a name is a folder, or the folder is a file."""
     for path in (folder / name for name in names):
         if path.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
