@@ -304,6 +304,15 @@ class Inside:
         """Whether an exception has ended its thread."""
         return not self._thread.is_alive()
 
+    def run(self, call: Callable[[], Any]) -> Any:
+        """Run a call on its thread, where services run: not amid a callback; return the result."""
+        task = self._executor.create_task(call)
+        end = time.monotonic() + DEADLINE
+        while not task.done():
+            assert time.monotonic() < end, f'it does not answer:\n{self.stderr}'
+            self._thread.join(0.01)
+        return task.result()
+
     def wait(self) -> int:
         """Return its exit code once it is done."""
         assert self._done is not None

@@ -281,7 +281,7 @@ def test_deactivation_brings_the_platform_to_rest(cueing: Any) -> None:
     node = cueing('start_timeout:=0.1')
     node.until(lambda: 0.05 < np.abs(node.last[3:6]).max() < 9.0,
                'it moves', (2.0, 1.0, GRAVITY))
-    node.node.trigger_deactivate()
+    node.program.run(node.node.trigger_deactivate)
     node.until(lambda: np.abs(node.last[3:6]).max() < 2e-4, 'it is at rest')
 
 
@@ -289,20 +289,20 @@ def test_the_whole_lifecycle(cueing: Any) -> None:
     """An unconfigured node takes another rate, and begins anew with it."""
     node = cueing('start_timeout:=0.1', 'autostart:=false')
     for change in (node.node.trigger_configure, node.node.trigger_activate):
-        assert change() == TransitionCallbackReturn.SUCCESS
+        assert node.program.run(change) == TransitionCallbackReturn.SUCCESS
     node.until(lambda: len(node.raw['accel']) > 10, 'setpoints come')
     for change in (node.node.trigger_deactivate, node.node.trigger_cleanup):
-        assert change() == TransitionCallbackReturn.SUCCESS
+        assert node.program.run(change) == TransitionCallbackReturn.SUCCESS
     node.until(lambda: not node.vehicle.get_subscription_count(), 'its topics are closed')
     assert node.node.set_parameters_atomically([
         RosParameter('cueing.rate', value=50.0)]).successful
     before = len(node.raw['accel'])
     for change in (node.node.trigger_configure, node.node.trigger_activate):
-        assert change() == TransitionCallbackReturn.SUCCESS
+        assert node.program.run(change) == TransitionCallbackReturn.SUCCESS
     # Some from before may come late.
     node.until(lambda: len(node.raw['accel']) > before + 10
                and (np.diff(node.rows()[0][-9:]) == 20_000_000).all(), 'setpoints come again')
-    assert node.node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
+    assert node.program.run(node.node.trigger_shutdown) == TransitionCallbackReturn.SUCCESS
 
 
 @pytest.mark.parametrize('force, text', [
