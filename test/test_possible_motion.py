@@ -47,7 +47,7 @@ def is_possible(platform: StewartPlatform, recorded: RecordedMotion, change: str
         rates = [by * each for each in rates[:2]] + [by ** 2 * each for each in rates[2:]]
     else:  # small turns from a first pose without one
         from scipy.spatial.transform import Rotation
-        turns = Rotation.from_matrix(m.rotation)
+        turns = Rotation.from_matrix(m.rotation.copy())
         first = turns[0]
         small = Rotation.from_rotvec(by * (turns * first.inv()).as_rotvec()) * first
         changed = Motion(position[0] + by * (position - position[0]), small.as_matrix(),
