@@ -77,7 +77,7 @@ extras_require = {
     ],
     'usd': ['usd-core>=24.8'],
     'test': [
-        'check-jsonschema',
+        'check-jsonschema>=0.38',  # older ones ask for a ruamel.yaml that breaks rosbags
         'cmake',
         'colcon-common-extensions',
         'dask',
@@ -87,7 +87,7 @@ extras_require = {
         'hypothesis',
         'import-linter',
         'ipykernel',
-        'jsonschema>=4',
+        'jsonschema>=4.18',  # for check-jsonschema
         'matplotlib',
         'mcap',
         'mcap-ros2-support',
