@@ -67,7 +67,7 @@ class CueingResult(Record):
     software: Annotated[str, means('name and version of the program that wrote the file')]
     date: Annotated[str, means('when')]
     vehicle: Annotated[str, means('path of the recording')]
-    likely_mistake: Annotated[str | None, means('the likely mistake in the recording')]
+    likely_mistake: Annotated[str | None, means('the possible error in the recording')]
     duration_s: Annotated[float, means('time from the first to the last sample')]
     samples: Annotated[int, means('samples of the recording')]
     notices: Annotated[list[str], means('how the recording was read')]

@@ -48,7 +48,7 @@ from stewart_dynamics.arrays import Array, NANOSECOND, NO_WRENCH, SECOND, Six
 from stewart_dynamics.core.binding import CODES, function, Sample
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.legs.kind import Named
-from stewart_dynamics.mechanics.drives.measured_efforts import SCALE
+from stewart_dynamics.mechanics.drives.measured_efforts import leaves_wrench
 from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
@@ -103,7 +103,7 @@ class Estimate(NamedTuple):
     @property
     def published(self) -> Six | None:
         """Return the wrench; None without one, or where it likely is that of a mistake."""
-        return self.wrench if self.mistake is None or self.mistake.what == SCALE else None
+        return self.wrench if leaves_wrench(self.mistake) else None
 
     @property
     def force(self) -> float:

@@ -23,7 +23,7 @@ from stewart_dynamics.external_wrench.estimate import (
     EXTERNAL_WRENCH, ExternalWrench, Target)
 from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs)
-from stewart_dynamics.mechanics.drives.measured_efforts import SCALE
+from stewart_dynamics.mechanics.drives.measured_efforts import leaves_wrench
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import stamp_of
 from stewart_dynamics.node.diagnostics.levels import LogLine, WARN
@@ -338,7 +338,7 @@ class DynamicsNode(ManagedNode[Parameters]):
         if silence := self._diagnostics.external_wrench.silence(time.monotonic()):
             return payload.PayloadOutcome(silence)
         mistake = self._measured_legs.mistake
-        if mistake is not None and mistake.what != SCALE:
+        if mistake and not leaves_wrench(mistake):
             return payload.PayloadOutcome(f'possible error: {mistake.text}')
         # Parameters are those of now, whatever changes meanwhile.
         return payload.identify(self._history, StewartPlatform(self._settings))

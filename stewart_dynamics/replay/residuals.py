@@ -27,7 +27,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.external_wrench.estimate import external_wrenches
 from stewart_dynamics.mechanics.drives.measured_efforts import (
-    EffortSums, has_losses, SCALE, without_losses)
+    EffortSums, has_losses, leaves_wrench, without_losses)
 from stewart_dynamics.mechanics.drives.motors import motor_ratio, Motors
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.rows import POSE
@@ -196,7 +196,7 @@ class Comparison:
     def values(self) -> Measured:
         """Return the comparison."""
         parameters, mistake, count = self._parameters, self._sums.mistake(), self._legs.count
-        load_known = mistake is None or mistake.what == SCALE
+        load_known = leaves_wrench(mistake)
         wrench = self._wrench if load_known else _Statistics()
         residual, measured = np.sum(self._legs.squares), np.sum(self._sums.measured_squares)
         found = of_kind(Measured, parameters.leg_kind)(

@@ -85,6 +85,11 @@ def without_losses(forces: Array, rates: Array, accelerations: Array, p: Paramet
     return loads
 
 
+def leaves_wrench(mistake: PossibleError | None) -> bool:
+    """Return whether measured efforts give an external wrench; those of a wrong scale do."""
+    return mistake is None or mistake.what == SCALE
+
+
 class EffortSums:
     """
     Sums over measured and computed forces of the legs, and the possible error that they show.

@@ -19,7 +19,7 @@ from stewart_dynamics.external_wrench.estimate import Estimate, Overload, WRENCH
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.external_wrench.payload import Payload, PayloadOutcome, rows_of
 from stewart_dynamics.legs.kind import Named
-from stewart_dynamics.mechanics.drives.measured_efforts import SCALE
+from stewart_dynamics.mechanics.drives.measured_efforts import leaves_wrench
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.node.diagnostics.levels import (
     ERROR, Level, LogLine, MISTAKEN, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
@@ -124,7 +124,7 @@ class ExternalWrenchDiagnostics(StatusPart):
 
 def _mistake(found: PossibleError) -> Mistake:
     """Return the possible error in the efforts for the status."""
-    wrench = '' if found.what == SCALE else '; no external wrench is published'
+    wrench = '' if leaves_wrench(found) else '; no external wrench is published'
     return Mistake(MEASURED_LEGS, f'possible error: {found.text}{wrench}', values=(
         ('possible error in the measurements', found.what),))
 
