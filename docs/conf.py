@@ -101,10 +101,11 @@ def label_cells(app: Sphinx, doctree: nodes.document, docname: str) -> None:
 # Pages of files that stand elsewhere: written here for each build, and ignored by git.
 
 def write_pages(app: Sphinx, config: Config) -> None:
-    """Copy notebooks and results of benchmarks; write releases of CHANGELOG.rst to docs/releases/."""
+    """Copy notebooks and benchmarks' results to docs/; write CHANGELOG.rst to docs/releases/."""
     # No symbolic links: newer MyST replaces one by its target, which is no page.
-    notebooks, results, releases = (ROOT / 'docs' / name for name in ('notebooks', 'results', 'releases'))
-    for folder in (notebooks, results, releases):
+    folders = notebooks, results, releases = [
+        ROOT / 'docs' / name for name in ('notebooks', 'results', 'releases')]
+    for folder in folders:
         shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(ROOT / 'examples' / 'notebooks', notebooks)
     shutil.copytree(ROOT / 'benchmarks' / 'results', results)
