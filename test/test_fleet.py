@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 import csv
 import errno
@@ -22,6 +22,7 @@ import json
 import logging
 import math
 import multiprocessing
+from multiprocessing.process import BaseProcess
 import os
 from pathlib import Path
 import pickle
@@ -600,15 +601,14 @@ def test_an_interrupt_leaves_no_partial_results(
 @pytest.mark.slow
 def test_a_signal_while_a_process_starts_is_not_in_its_way(
         short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The signal comes between the start of a process and that of the thread that ends it."""
-    start, begun = ProcessPoolExecutor._start_executor_manager_thread, set()
+    start, begun = BaseProcess.start, []
 
-    def interrupted(pool: ProcessPoolExecutor) -> None:
+    def interrupted(process: BaseProcess) -> None:
         signal.raise_signal(signal.SIGINT)
-        begun.add(pool)
-        start(pool)
+        start(process)
+        begun.append(process)
 
-    monkeypatch.setattr(ProcessPoolExecutor, '_start_executor_manager_thread', interrupted)
+    monkeypatch.setattr(BaseProcess, 'start', interrupted)
     output = tmp_path / 'out'
     handler, others = signal.getsignal(signal.SIGINT), set(multiprocessing.active_children())
     try:
