@@ -40,7 +40,7 @@ install_requires = [
     'msgspec>=0.18.6',  # records of results
     'numpy>=1.26',
     'orjson>=3.9',
-    'plotly>=6',  # plotly.js in the report
+    'plotly>=6',  # plotly.js in the report, figures of the library
     'pyyaml>=6',
     'rosbags>=0.11',
     'tqdm>=4.64',
@@ -65,7 +65,6 @@ extras_require = {
     'mujoco': ['mujoco>=3.14'],  # before, inertias have errors of 1e-5
     'parquet': ['pyarrow>=14'],
     'pandas': ['pandas>=2'],
-    'plot': ['matplotlib>=3.7'],  # a legend outside of the axes
     'response': ['scipy>=1.10'],
     'ros': [
         'ros-jazzy-common-interfaces~=5.3',

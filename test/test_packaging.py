@@ -53,7 +53,7 @@ KEYS = {
 ENGINES = {'pydrake', 'pytransform3d', 'urchin', 'xdist', 'yourdfpy'}
 # Modules that are imported where an option asks for them, and the extra that brings them.
 OPTIONAL = {'argcomplete': 'completion', 'cupy': 'gpu', 'dask': 'cluster',
-            'distributed': 'cluster', 'matplotlib': 'plot', 'mujoco': 'mujoco',
+            'distributed': 'cluster', 'mujoco': 'mujoco',
             'pandas': 'pandas', 'pxr': 'usd', 'pyarrow': 'parquet', 'scipy': 'differentiate'}
 # Modules whose name on PyPI is not their own.
 PIP_NAMES = {'cupy': 'cupy-cuda12x', 'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin',

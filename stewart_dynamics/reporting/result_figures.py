@@ -1,36 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The library's results as figures of matplotlib: curves of the six legs, one above the other."""
+"""The library's results as figures of plotly: curves of the six legs, one above the other."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from io import BytesIO
 
-try:
-    from matplotlib.figure import Figure
-except ImportError as exc:
-    raise ModuleNotFoundError(
-        'plot: matplotlib is not installed: pip install matplotlib') from exc
 import numpy as np
 from numpy.typing import ArrayLike
+from plotly.graph_objects import Figure
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.colors import LEG_COLORS
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
 
-_HEIGHT = 2.6  # of one plot [in]
-
-
-class NotebookFigure(Figure):
-    """A figure that Jupyter shows as a picture, also where pyplot is not imported."""
-
-    def _repr_png_(self) -> bytes:
-        """Return the picture, as IPython asks for it."""
-        picture = BytesIO()
-        self.savefig(picture, format='png')
-        return picture.getvalue()
+_HEIGHT = 250  # of one plot [px]
 
 
 def figure_of_legs(quantities: Mapping[str, Array], times: ArrayLike | None,
@@ -44,13 +30,15 @@ def figure_of_legs(quantities: Mapping[str, Array], times: ArrayLike | None,
     if len(shape) != 2:
         raise MotionError(f'plot: results of shape {shape[:-1]}: must be (N,)')
     across = np.arange(shape[0]) if times is None else as_array('times', times, shape[:1])
-    made = NotebookFigure(figsize=(8.0, 0.4 + _HEIGHT * len(quantities)), layout='constrained')
-    every = made.subplots(len(quantities), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, (title, values) in zip(every, quantities.items(), strict=True):
-        lines = axes.plot(across, values)
-        axes.set_ylabel(title)
-        axes.grid(alpha=0.3)
-    every[-1].set_xlabel('sample' if times is None else 'time [s]')
-    # beside the axes: no curve is below it
-    made.legend(lines, list(joints), loc='outside upper center', ncols=6, frameon=False)
-    return made
+    curves = [
+        {'x': across, 'y': values[:, n], 'yaxis': f'y{row}', 'name': joint,
+         'line': {'color': color, 'width': 1.5}, 'legendgroup': joint, 'showlegend': row == 1}
+        for row, values in enumerate(quantities.values(), 1)
+        for n, (joint, color) in enumerate(zip(joints, LEG_COLORS, strict=True))]
+    axes = {f'yaxis{row}': {'title': {'text': title}} for row, title in enumerate(quantities, 1)}
+    return Figure(curves, {
+        **axes, 'xaxis': {'title': {'text': 'sample' if times is None else 'time [s]'}},
+        # one axis below all plots, for which they are zoomed together
+        'grid': {'columns': 1, 'rows': len(axes), 'pattern': 'coupled', 'ygap': 0.12},
+        'legend': {'orientation': 'h', 'y': 1.01, 'yanchor': 'bottom'},  # above: no curve is below
+        'height': 100 + _HEIGHT * len(axes), 'margin': {'t': 40}, 'template': 'plotly_white'})

@@ -44,7 +44,7 @@ from stewart_dynamics.mechanics.leg_columns import columns, LEGS
 from stewart_dynamics.parameters.table import Parameters
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from plotly.graph_objects import Figure
 
 
 # A row of the six motors' quantities. Commands are the torques of the forces that are published,
@@ -118,7 +118,7 @@ class Motors(NamedTuple):
 
     def plot(self, times: ArrayLike | None = None, joints: Sequence[str] = LEGS) -> Figure:
         """
-        Return a matplotlib figure of speeds and torques, and of currents and power if known.
+        Return a plotly figure of speeds and torques, and of currents and power if known.
 
         Arguments and errors are those of ``InverseDynamics.plot``.
         """

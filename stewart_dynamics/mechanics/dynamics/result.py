@@ -21,7 +21,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from plotly.graph_objects import Figure
     from pandas import DataFrame
 
 
@@ -136,7 +136,7 @@ class InverseDynamics:
 
     def plot(self, times: ArrayLike | None = None, joints: Sequence[str] = LEGS) -> Figure:
         """
-        Return a matplotlib figure of lengths, rates and forces.
+        Return a plotly figure of lengths, rates and forces.
 
         Parameters
         ----------
@@ -147,8 +147,6 @@ class InverseDynamics:
 
         Raises
         ------
-        ModuleNotFoundError
-            Matplotlib is not installed.
         MotionError
             There is one sample alone, or times do not fit.
 
