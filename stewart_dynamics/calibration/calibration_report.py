@@ -21,7 +21,7 @@ from stewart_dynamics.estimation.confidence_level import INTERVAL, TWO_SIDED
 from stewart_dynamics.legs.calibrated import Calibrated, listed
 from stewart_dynamics.reporting.estimates import FIXED, page_values
 from stewart_dynamics.reporting.pages import digits, page
-from stewart_dynamics.reporting.vector_picture import Chart, Picture, tick_text, ticks
+from stewart_dynamics.reporting.vector_picture import Chart, Picture
 from stewart_dynamics.whole_file import write_files
 
 _FOLDER = Path(__file__).with_name('templates')
@@ -89,7 +89,8 @@ def _row(found: Calibration, row: Sequence[Calibrated]) -> str:
         count, axes = part.stop - part.start, _letters(of)
         chart = Chart(picture, (left, 34.0, _WIDTHS[len(of.axes)], 220.0), (-0.6, count - 0.4),
                       (-end, end))
-        _frame(picture, chart, f'{of.words} [{unit}]', left == _LEFT)
+        picture.text([left, 22.0], f'{of.words} [{unit}]', css='view')
+        chart.draw_levels(6, numbers=left == _LEFT)
         for n in range(count):
             leg, axis = divmod(n, len(axes))
             value, half = moved[part][n], min(halves[part][n], 2.0 * end)
@@ -109,16 +110,6 @@ def _row(found: Calibration, row: Sequence[Calibrated]) -> str:
 def _letters(of: Calibrated) -> Sequence[str]:
     """Return the letters of the numbers of a leg: of joints their axes."""
     return of.axes if len(of.axes) == 3 else '12' if len(of.axes) == 2 else ' '
-
-
-def _frame(picture: Picture, chart: Chart, title: str, first: bool) -> None:
-    left, top, width, _ = chart.frame
-    picture.text([left, top - 12.0], title, css='view')
-    for value in ticks(*chart.y, 6):
-        _, y = chart.at([0.0, value])
-        picture.line([left, y], [left + width, y], css='zero' if value == 0.0 else 'grid')
-        if first:
-            picture.text([left - 6.0, y + 3.5], tick_text(value), 'end', css='tick')
 
 
 def _seen_from_above(found: Calibration, part: slice) -> tuple[Array, Array, Array, float]:

@@ -194,7 +194,7 @@ def use_chart(seconds: Array, used: Mapping[str, Array], timeout: float) -> Pict
 
 def _look(n: int) -> dict[str, Any]:
     """Return color and dashes of a curve: an equal one below it is seen in their gaps."""
-    return {'css': f'curve curve{n}', 'stroke_dasharray': _CURVE_DASHES[n % len(_CURVE_DASHES)]}
+    return {'css': f'curve leg{n}', 'stroke_dasharray': _CURVE_DASHES[n % len(_CURVE_DASHES)]}
 
 
 def _toward(azimuth: ArrayLike) -> Array:

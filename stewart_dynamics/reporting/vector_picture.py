@@ -101,12 +101,18 @@ class Chart:
             x, _ = self.at([value, self.y[0]])
             p.line([x, top], [x, top + height], css='zero' if value == 0.0 else 'grid')
             p.text([x, top + height + 13], tick_text(value), 'middle', css='tick')
-        for value in ticks(*self.y, count):
-            _, y = self.at([self.x[0], value])
-            p.line([left, y], [left + width, y], css='zero' if value == 0.0 else 'grid')
-            p.text([left - 5, y + 3.5], tick_text(value), 'end', css='tick')
+        self.draw_levels(count)
         p.text([left + width, top + height + 27], x_title, 'end', css='axis')
         p.text([left - 30, top - 8], y_title, css='axis')
+
+    def draw_levels(self, count: int, numbers: bool = True) -> None:
+        """Draw the grid of y, and its numbers."""
+        left, _, width, _ = self.frame
+        for value in ticks(*self.y, count):
+            _, y = self.at([self.x[0], value])
+            self.picture.line([left, y], [left + width, y], css='zero' if value == 0.0 else 'grid')
+            if numbers:
+                self.picture.text([left - 5, y + 3.5], tick_text(value), 'end', css='tick')
 
 
 def ticks(low: float, high: float, count: int) -> list[float]:
