@@ -263,6 +263,20 @@ def test_absolute_and_relative_names_have_no_common_folder(page: Page, tmp_path:
     assert page.column('bag') == ['/a/b', 'c/d']
 
 
+def test_totals_are_those_of_all_bags(page: Page, tmp_path: Path) -> None:
+    """Of each kind of legs, of bags that failed none."""
+    cranks = {'torque_worst_n_m': -3.5, 'torque_worst_leg': 'leg_2', 'setpoints': 2000,
+              'duration_s': 90.0, 'determinant_nearest_m3': -0.25}
+    for rows, told in (
+            (six(), 'bags 6 setpoints 5 000 recorded 50.0 s worst force 1 000 N leg_0, e '
+                    'det(J) nearest 0 0.25 m³ b'),
+            ([row(f'/of/{name}', 0) | cranks for name in 'ab'],
+             'bags 2 setpoints 4 000 recorded 3.0 min worst torque −3.5 N m leg_2, a '
+             'det(J) nearest 0 −0.25 m³ a')):
+        page.show(tmp_path, rows)
+        assert ' '.join(page.page.inner_text('dl').split()) == told
+
+
 def test_failed_bags_and_exceeded_limits_are_highlighted(page: Page, tmp_path: Path) -> None:
     page.show(tmp_path, six())
 

@@ -6,7 +6,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import csv
 from functools import cache, partial
 import io
@@ -28,7 +29,7 @@ from stewart_dynamics.replay.motor_loads import needed_motor
 from stewart_dynamics.replay.replay_options import LIMIT_MET
 from stewart_dynamics.replay.statements import (
     MEASURED, MISSING, needed_words, statements, values_of)
-from stewart_dynamics.reporting.pages import page
+from stewart_dynamics.reporting.pages import digits, page, thousands
 from stewart_dynamics.reporting.results_folder import REPORT_PAGE
 from stewart_dynamics.whole_file import FilesOfFolder
 
@@ -260,28 +261,62 @@ def _harmless(key: str, cell: Cell) -> Cell:
 def _page(output: Path, rows: Sequence[Row]) -> str:
     shown = [column for column in columns_of(_kind_of(rows)) if column.head and not (
         column.optional and all(row.get(column.key) is None for row in rows))]
-    prefix = _prefix_of_motors(_kind_of(rows))
-    loads: list[Any] = [
-        [row[prefix + key] for key in ('torque_rms_n_m', 'torque_peak_n_m', 'speed_peak_rad_s')]
-        for row in rows if f'{prefix}torque_peak_n_m' in row and not row['warnings']]
+    prefix = os.path.commonprefix([f'{row["bag"]}' for row in rows])
+    folder = prefix[:prefix.rfind('/') + 1] if len(rows) > 1 else ''
+    software = next((f'{row["software"]}' for row in rows if 'software' in row), '')
+    counts = Counter(row['result'] for row in rows)
+    counts['all'] = len(rows)
     fleet = {
-        'software': next((row['software'] for row in rows if 'software' in row), ''),
-        'columns': [{'key': column.key, 'head': column.head, 'unit': column.unit,
-                     'number': column.number, 'size': column.size} for column in shown],
+        'columns': [{'key': column.key, 'number': column.number, 'size': column.size}
+                    for column in shown],
         # The colour of a row.
         'codes': [LIMIT_MET if row['result'] == REJECTED else row['code'] for row in rows],
         'severity': SEVERITY,
-        'motor': needed_words(needed_motor(loads)),
+        'results': [result for result in ('all', *SEVERITY) if counts[result]],
+        'folder': folder,
         'links': [_link(output, row) for row in rows],
         'rows': [[_shown(row.get(column.key)) for column in shown] for row in rows],
     }
-    return page(FOLDER, 'index', fleet=fleet)
+    return page(FOLDER, 'index', fleet=fleet, columns=shown, counts=counts,
+                totals=[*_totals(rows, len(folder))],
+                software=', bags in '.join(filter(None, (software, folder))))
+
+
+def _totals(rows: Sequence[Row], cut: int) -> Iterator[tuple[str, str, str]]:
+    """Yield name, text and remark of the numbers of all bags; names of bags begin at ``cut``."""
+    kind = _kind_of(rows)
+    effort, prefix = kind.effort, _prefix_of_motors(kind)
+
+    def known(key: str) -> list[tuple[float, str, Row]]:
+        return [(found, f'{row["bag"]}'[cut:], row) for row in rows
+                if isinstance(found := row.get(key), int | float) and math.isfinite(found)]
+
+    seconds = sum(found for found, *_ in known('duration_s'))
+    yield 'bags', thousands(len(rows)), ''
+    yield 'setpoints', thousands(sum(int(found) for found, *_ in known('setpoints'))), ''
+    yield 'recorded', (f'{seconds:.1f} s' if seconds < 120.0 else f'{seconds / 60.0:.1f} min'
+                       if seconds < 7200.0 else f'{seconds / 3600.0:.1f} h'), ''
+    worst = known(key_of(f'{effort.name}_worst', effort.unit))
+    if worst:
+        value, name, row = max(worst, key=lambda each: abs(each[0]))
+        yield (f'worst {effort.name}', f'{digits(value)} {effort.unit}',
+               f'{row[f"{effort.name}_worst_leg"]}, {name}')
+    nearest = known('determinant_nearest_m3')
+    if nearest:
+        value, name, _ = min(nearest, key=lambda each: abs(each[0]))
+        yield 'det(J) nearest 0', f'{digits(value)} m³', name
+    loads: list[Any] = [
+        [row[prefix + key] for key in ('torque_rms_n_m', 'torque_peak_n_m', 'speed_peak_rad_s')]
+        for row in rows if f'{prefix}torque_peak_n_m' in row and not row['warnings']]
+    motor = needed_words(needed_motor(loads))
+    if motor:
+        yield 'motor needed', motor, 'without bags with singularity warnings'
 
 
 def _shown(cell: Cell) -> Cell:
-    """Return a number rounded to nine digits, None if it is not finite."""
+    """Return a number rounded to nine digits, none of them -0, None if it is not finite."""
     if isinstance(cell, float):
-        return float(f'{cell:.9g}') if math.isfinite(cell) else None
+        return float(f'{cell:.9g}') + 0.0 if math.isfinite(cell) else None
     return cell
 
 

@@ -49,10 +49,7 @@ const rows = fleet.rows.map((cells, n) => ({
 }));
 
 // Names without the folder that all of them are in; a narrow column cuts their beginnings.
-const bags = fleet.rows.map((cells) => cells[at.bag]);
-let folder = bags.length > 1 ? bags[0].slice(0, bags[0].lastIndexOf('/') + 1) : '';
-while (folder && !bags.every((bag) => bag.startsWith(folder))) folder = folder.slice(0, folder.slice(0, -1).lastIndexOf('/') + 1);
-const nameOf = (cells) => cells[at.bag].slice(folder.length);
+const nameOf = (cells) => cells[at.bag].slice(fleet.folder.length);
 
 function lineOf(row) {
   if (row.line) return row.line;
@@ -113,19 +110,7 @@ function sortBy(m) {
   show();
 }
 
-const heads = document.querySelector('thead tr');
-fleet.columns.forEach(({key, head, unit, number, size}, m) => {
-  const cell = element('th', undefined, number ? 'number' : '');
-  cell.scope = 'col';
-  const button = element('button', head);
-  button.type = 'button';
-  button.title = size ? 'sort by magnitude' : 'sort';
-  button.append(element('i'));
-  if (unit) button.append(element('br'), element('small', unit));
-  button.addEventListener('click', () => sortBy(m));
-  cell.append(button);
-  heads.append(cell);
-});
+document.querySelectorAll('th button').forEach((button, m) => button.addEventListener('click', () => sortBy(m)));
 
 // Rows shown: those that pass the filters, as far as the table has been scrolled.
 let only = null;
@@ -156,42 +141,10 @@ window.addEventListener('beforeprint', () => {
 });
 filter.addEventListener('input', show);
 
-const choices = document.getElementById('results');
-choices.style.display = 'contents';
-for (const result of [null, ...fleet.severity]) {
-  const number = result === null ? rows.length : rows.filter((row) => row.cells[at.result] === result).length;
-  if (result !== null && !number) continue;
-  const button = element('button', result === null ? 'all' : result);
-  button.type = 'button';
-  button.append(' ', element('b', shown(number)));
-  button.setAttribute('aria-pressed', result === null);
-  button.addEventListener('click', () => {
-    only = result;
-    for (const each of choices.children) each.setAttribute('aria-pressed', each === button);
-    show();
-  });
-  choices.append(button);
-}
-
-// Totals
-const of = (key) => rows.map((row) => ({row, value: row.cells[at[key]]})).filter(({value}) => value !== null);
-const sum = (key) => of(key).reduce((total, {value}) => total + value, 0);
-const most = (key, better) => of(key).reduce((best, each) => !best || better(Math.abs(each.value), Math.abs(best.value)) ? each : best, null);
-function total(name, value, remark) {
-  const group = element('div');
-  const about = element('dd', value);
-  if (remark) about.append(' ', element('small', remark));
-  group.append(element('dt', name), about);
-  document.getElementById('totals').append(group);
-}
-document.getElementById('software').textContent = [fleet.software, folder].filter((text) => text).join(', bags in ');
-total('bags', shown(rows.length));
-total('setpoints', shown(sum('setpoints')));
-const seconds = sum('duration_s');
-total('recorded', seconds < 120 ? `${seconds.toFixed(1)} s` : seconds < 7200 ? `${(seconds / 60).toFixed(1)} min` : `${(seconds / 3600).toFixed(1)} h`);
-const force = most('force_worst_n', (a, b) => a > b);
-if (force) total('worst force', `${cellText(force.value, at.force_worst_n)} N`, `${force.row.cells[at.force_worst_leg]}, ${nameOf(force.row.cells)}`);
-const nearest = most('determinant_nearest_m3', (a, b) => a < b);
-if (nearest) total('det(J) nearest 0', `${cellText(nearest.value, at.determinant_nearest_m3)} m³`, nameOf(nearest.row.cells));
-if (fleet.motor) total('motor needed', fleet.motor, 'without bags with singularity warnings');
+const choices = document.querySelectorAll('nav button');
+choices.forEach((button, n) => button.addEventListener('click', () => {
+  only = n ? fleet.results[n] : null;
+  choices.forEach((each) => each.setAttribute('aria-pressed', each === button));
+  show();
+}));
 show();
