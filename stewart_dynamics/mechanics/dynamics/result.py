@@ -21,8 +21,8 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
 
 if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
     from pandas import DataFrame
+    from plotly.graph_objects import Figure
 
 
 def _column(where: slice | int, text: str) -> Any:
