@@ -264,7 +264,7 @@ def test_absolute_and_relative_names_have_no_common_folder(page: Page, tmp_path:
 
 
 def test_totals_are_those_of_all_bags(page: Page, tmp_path: Path) -> None:
-    """Also with cranks; bags that failed have none."""
+    """Also with cranks; bags that failed are left out."""
     cranks = {'torque_worst_n_m': -3.5, 'torque_worst_leg': 'leg_2', 'setpoints': 2000,
               'duration_s': 90.0, 'determinant_nearest_m3': -0.25}
     for rows, told in (

@@ -314,7 +314,7 @@ def _totals(rows: Sequence[Row], cut: int) -> Iterator[tuple[str, str, str]]:
 
 
 def _shown(cell: Cell) -> Cell:
-    """Return a number rounded to nine digits, none of them -0, None if it is not finite."""
+    """Return a number rounded to nine digits, 0 for -0, None if it is not finite."""
     if isinstance(cell, float):
         return float(f'{cell:.9g}') + 0.0 if math.isfinite(cell) else None
     return cell

@@ -5,8 +5,8 @@
 """
 Many bags in processes of this computer, which replay one bag at a time.
 
-Each process has a connection of its own: its end is that of one bag, and a closed connection
-stops it, also where the process that started it was killed.
+Each process has a connection of its own. Where a process is killed, only its bag fails; a closed
+connection stops a process, also where the one that started it was killed.
 """
 
 from __future__ import annotations
