@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The pictures of the README: what `make docs` draws, within what GitHub shows."""
+"""The vector pictures of README and pages: what `make docs` draws, within what GitHub shows."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SVG = '{http://www.w3.org/2000/svg}'
 
 
-@pytest.fixture(scope='module', params=['badges', 'moving'])
+@pytest.fixture(scope='module', params=['badges', 'cranks', 'moving'])
 def figure(request: pytest.FixtureRequest) -> ModuleType:
     """Return a script that draws a picture."""
     with pytest.MonkeyPatch.context() as patch:

@@ -18,7 +18,6 @@ from draw import Recorded, ROOT
 import numpy as np
 from stewart_dynamics import Pose
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.colors import custom_properties
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
 
@@ -102,7 +101,7 @@ def draw() -> str:
     samples = np.searchsorted(time, np.arange(0.0, time[-1], 1.0 / RATE))
     seconds = len(samples) / RATE + PAUSE
     shown = 100.0 / (RATE * seconds)  # a frame's part of a turn [%]
-    style = custom_properties() + STYLE
+    style = STYLE
     for name, share in (('frame', shown), ('last', shown + 100.0 * PAUSE / seconds)):
         style += (f'.{name} {{ visibility: hidden; animation: {name} {seconds:g}s step-end '
                   f'infinite; }}\n@keyframes {name} {{ 0% {{ visibility: visible; }} '
@@ -114,10 +113,7 @@ def draw() -> str:
               f'<g transform="translate(0 14) scale(1.14)">{hexapod}</g>{forces.at(sample)}</g>'
               for n, (sample, hexapod) in enumerate(zip(
                   samples, hexapods(recorded, samples), strict=True))]
-    head, body = forces.picture.svg().split('>', 1)
-    return (f'{head} xmlns="http://www.w3.org/2000/svg">\n<style>\n{style}</style>\n'
-            f'<rect width="100%" height="100%" fill="#ffffff"/>\n'
-            f'{body.removesuffix("</svg>")}\n' + '\n'.join([*frames, '</svg>', '']))
+    return forces.picture.document(style, *frames)
 
 
 def main() -> None:

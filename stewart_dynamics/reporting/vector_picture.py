@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.colors import custom_properties
 
 
 class Picture:
@@ -65,6 +66,14 @@ class Picture:
         width, height = _short(self.width), _short(self.height)
         return (f'<svg viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
                 f'role="img" aria-label="{escape(self.title)}">{"".join(self._elements)}</svg>')
+
+    def document(self, style: str, *groups: str) -> str:
+        """Return a file of its own: on white, with a style sheet, below groups of elements."""
+        head, body = self.svg().removesuffix('</svg>').split('>', 1)
+        return '\n'.join([
+            f'{head} xmlns="http://www.w3.org/2000/svg">', f'<style>\n{custom_properties()}{style}'
+            '</style>', '<rect width="100%" height="100%" fill="#ffffff"/>', body, *groups,
+            '</svg>', ''])
 
 
 class Chart:
