@@ -198,7 +198,7 @@ def test_accelerations_by_mujocos_dynamics_with_closed_loops_are_the_same(seed, 
     platform, simulation = StewartPlatform(p), Simulation(p)
     # The model has no inertia of legs about their own axes: the written one changes accelerations
     # of fast cranks by up to 2e-6.
-    for part in (leg.last.name for leg in Hexapod(p).legs):
+    for part in (leg.last for leg in Hexapod(p).legs):
         moments = simulation.model.body_inertia[simulation.model.body(part).id]
         moments[np.argmin(moments)] *= 1e-3
     efforts = rng(seed).uniform(-2.0, 2.0, (20, 6)) * np.abs(efforts_of(p, motions))

@@ -300,7 +300,7 @@ def test_an_open_urdf_in_which_one_leg_carries_the_platform_is_read_and_reported
                 root.remove(link)
         leg = hexapod.legs[0]
         joint = ET.SubElement(root, 'joint', {'name': 'ball', 'type': 'spherical'})
-        ET.SubElement(joint, 'parent', {'link': leg.last.name})
+        ET.SubElement(joint, 'parent', {'link': leg.last})
         ET.SubElement(joint, 'child', {'link': 'platform'})
         # The platform's frame is at its joint: the other joints are read relative to it.
         turn = to_euler(leg.branch.links[0].at_home.rotation.T)

@@ -92,7 +92,7 @@ def test_a_tree_in_which_one_rod_carries_the_platform_is_read(tmp_path: Path) ->
     for name in links[:3]:
         ET.SubElement(root, 'link', {'name': name})
     first = ET.SubElement(root, 'joint', {'name': 'to_ball', 'type': 'fixed'})
-    ET.SubElement(first, 'parent', {'link': leg.last.name})
+    ET.SubElement(first, 'parent', {'link': leg.last})
     ET.SubElement(first, 'child', {'link': links[0]})
     ET.SubElement(first, 'origin', {
         'xyz': ' '.join(map(repr, leg.branch.end.tolist())),

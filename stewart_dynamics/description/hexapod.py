@@ -4,21 +4,23 @@
 """
 A hexapod as the writers of all formats need it: names, frames, bodies and shapes.
 
-A leg has two bodies, whose joints and axes ``LegBranch`` has. Shapes are plates,
-cylinders and balls, or meshes from files; their sizes follow from the geometry, as those of the
-node's markers do, and have no influence on masses.
+All writers walk one tree, ``Hexapod.tree``: base, two bodies of each leg, platform, as
+``LegBranch`` has them. Shapes are plates, cylinders and balls, or meshes from files; their sizes
+follow from the geometry, as those of the node's markers do, and have no influence on masses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.legs.mechanism import UNIVERSAL, WORLD
+from stewart_dynamics.legs.mechanism import (
+    FIXED, HERE, Joint, MechanismBody, OTHER, Placement, UNIVERSAL, WORLD)
 from stewart_dynamics.legs.tree import (
     BALL, LegBranch, LegLink, PLATE, UNIVERSAL_JOINTS, VisualShape)
 from stewart_dynamics.mechanics.frames.rotation import from_euler
@@ -44,42 +46,24 @@ PASSIVE_RATE = 1000.0
 UNLIMITED = 1e9  # effort or rate of a leg without a limit, where a format requires one
 
 
-class RigidBody(NamedTuple):
-    """A rigid body."""
-
-    name: str
-    mass: float  # [kg]
-    center: Array  # center of mass, axes of the body (3,) [m]
-    inertia: Array  # about the center of mass, axes of the body (3, 3) [kg m^2]
-
-
-def massless(name: str) -> RigidBody:
+def massless(name: str) -> MechanismBody:
     """Return a body that is only a frame."""
-    return RigidBody(name, 0.0, np.zeros(3), np.zeros((3, 3)))
+    return MechanismBody(name, HERE, 0.0)
 
 
 class LegDescription(NamedTuple):
-    """A leg: its names, its joints, its two bodies, and the properties of its actuator."""
+    """A leg: its names, the points of its joints, and its branch of the tree."""
 
     name: str
     cross: str  # name of the massless body between the joints of the universal joint
     bearing: str  # name of the body that has the axes of the mount, in MJCF
     universal: tuple[str, str]  # names of these joints
+    bodies: tuple[str, str]
     ball: str  # name of the joint at the platform, and of the frame on the platform where it is
     tip: str  # name of the end of the leg there
     base_joint: Array  # base frame (3,) [m]
     platform_joint: Array  # platform frame (3,) [m]
     branch: LegBranch
-    bodies: tuple[RigidBody, RigidBody]  # of its links
-    reflected: float  # mass or inertia
-    viscous_friction: float
-    coulomb_friction: float
-    limits: DriveLimits
-
-    @property
-    def links(self) -> Iterator[tuple[LegLink, RigidBody]]:
-        """Return its links with their bodies, from the base on."""
-        return zip(self.branch.links, self.bodies, strict=True)
 
     @property
     def drive(self) -> LegLink:
@@ -87,38 +71,25 @@ class LegDescription(NamedTuple):
         return next(link for link in self.branch.links if link.joint != UNIVERSAL)
 
     @property
-    def last(self) -> RigidBody:
-        """Return the body at the platform."""
+    def last(self) -> str:
+        """Return the name of the body at the platform."""
         return self.bodies[-1]
 
     @property
     def end_frame(self) -> str:
         """Return the name of the frame on it whose origin is the joint at the platform."""
-        return self.tip if self.branch.end.any() else self.last.name
-
-    @property
-    def at_home(self) -> float:
-        """Return the position of the joint of the drive at home [m, rad]."""
-        return self.branch.home - self.branch.zero
-
-    def carrier(self, link: LegLink, base: str) -> str:
-        """Return the name of the body before a link; ``base`` is that of the base."""
-        return base if link is self.branch.links[0] else self.bodies[0].name
-
-    def bounds(self) -> tuple[float, float]:
-        """Return the limits of its position, wide bounds where it is unlimited [m, rad]."""
-        widest, limits = self.branch.widest, self.limits
-        return (widest[0] if limits.lowest is None else limits.lowest,
-                widest[1] if limits.highest is None else limits.highest)
+        return self.tip if self.branch.end.any() else self.last
 
 
-class DriveLimits(NamedTuple):
-    """The limits of a drive; None where it is unlimited."""
+class TreeBody(NamedTuple):
+    """A body at home, placed in base axes, and the joint that carries it on the one before it."""
 
-    lowest: float | None
-    highest: float | None
-    rate: float | None
-    effort: float | None
+    body: MechanismBody
+    joint: Joint  # FIXED: the base in the world; OTHER: the platform, which the legs carry
+    at_home: Placement  # in the body before it
+    at_zero: Placement  # where the position of the joint is zero
+    shapes: tuple[VisualShape, ...]
+    leg: LegDescription | None = None
 
 
 class Hexapod:
@@ -138,9 +109,9 @@ class Hexapod:
         self.base, self.platform = parameters.base_frame, parameters.platform_frame
         self.base_body = f'{WORLD}_base' if self.base == WORLD else self.base
         """The name of the base where a format has a world of its own, whose name is taken."""
-        self.platform_body = RigidBody(
-            self.platform, parameters.platform.mass, parameters.platform.center_of_mass,
-            inertia_matrix(parameters.platform.inertia))
+        self.platform_body = MechanismBody(
+            self.platform, Placement(self.rotation, self.position), parameters.platform.mass,
+            parameters.platform.center_of_mass, inertia_matrix(parameters.platform.inertia))
         size = mean_radius(parameters.geometry.platform_joints)
         self.kind = parameters.leg_kind
         branches = self.kind.branches(
@@ -156,8 +127,7 @@ class Hexapod:
         """Raise ParameterError where a name is taken; some formats have one list for all."""
         names = [WORLD, self.base_body, self.platform, *self.joints]
         for leg in self.legs:
-            names += [leg.cross, leg.bearing, *(body.name for body in leg.bodies), leg.ball,
-                      leg.tip]
+            names += [leg.cross, leg.bearing, *leg.bodies, leg.ball, leg.tip]
         twice = [name for n, name in enumerate(names) if name in names[:n]]
         if twice:
             raise ParameterError(
@@ -168,37 +138,96 @@ class Hexapod:
     def _leg(self, n: int, branch: LegBranch) -> LegDescription:
         p = self.parameters
         name = p.joints[n]
-        low, high = self.kind.position_limits
+        first, second = (f'{name}_{each}' for each in UNIVERSAL_JOINTS)
+        lower, upper = (f'{name}_{link.part}' for link in branch.links)
         return LegDescription(
-            name, f'{name}_cross', f'{name}_mount',
-            (f'{name}_{UNIVERSAL_JOINTS[0]}', f'{name}_{UNIVERSAL_JOINTS[1]}'),
+            name, f'{name}_cross', f'{name}_mount', (first, second), (lower, upper),
             f'{name}_platform_joint', f'{name}_tip', p.geometry.base_joints[n],
-            p.geometry.platform_joints[n], branch,
-            (_body(name, branch.links[0]), _body(name, branch.links[1])),
-            float(p[self.kind.fields['reflected_mass']][n]),
-            float(p.actuator.viscous_friction[n]), float(p.actuator.coulomb_friction[n]),
-            DriveLimits(*(None if p[each] is None else float(p[each][n]) for each in (
-                low, high, self.kind.rate_limit, self.kind.effort_limit))))
+            p.geometry.platform_joints[n], branch)
 
-    def solid(self, link: LegLink, body: RigidBody) -> RigidBody:
+    def tree(self, base: str = '', solid: bool = True, uris: bool = True, from_home: bool = False,
+             paired: bool = False, unlimited: float | None = None) -> list[TreeBody]:
+        """
+        Return base, bodies of each leg from the base on, and platform, as a format has them.
+
+        base: its name where it is not ``base_body``.
+        solid: give bodies of legs mass and inertia about all axes.
+        uris: take meshes that are no paths, too.
+        from_home: the format counts positions from home; from where parameters count them, if that
+            is no parameter.
+        paired: a joint with one limit has both.
+        unlimited: effort and rate where the format requires limits of each joint.
+        """
+        base = base or self.base_body
+        p, size = self.parameters.geometry, mean_radius(self.parameters.geometry.platform_joints)
+        at_base, at_platform = (
+            self._mesh(part, uris) or _plate(part, joints, size) for part, joints in (
+                ('base', p.base_joints), ('platform', p.platform_joints)))
+        found = [TreeBody(massless(base), Joint(f'{base}_to_world', FIXED, WORLD, base,
+                                                HERE.position), HERE, HERE, at_base)]
+        for n, leg in enumerate(self.legs):
+            at, parent = HERE, base
+            for link, name in zip(leg.branch.links, leg.bodies, strict=True):
+                at = at.of(link.at_home)
+                joint = Joint(leg.name, link.joint, parent, name, at.position,
+                              [at.rotation[:, 2]])
+                if link.joint == UNIVERSAL:
+                    joint.name, joint.axes = f'{leg.name}_universal', [*at.rotation.T[:2]]
+                else:
+                    self._add_drive(joint, n, from_home, paired, unlimited)
+                body = MechanismBody(name, at, link.mass, link.center, link.inertia)
+                found.append(TreeBody(
+                    self.solid(link, body) if solid else body, joint, link.at_home, link.at_zero,
+                    self._mesh(link.part, uris) or link.shapes, leg))
+                parent = name
+        platform = self.platform_body
+        return [*found, TreeBody(
+            platform, Joint(self.platform, OTHER, base, self.platform, self.position),
+            platform.placement, HERE, at_platform)]
+
+    def _add_drive(self, joint: Joint, n: int, from_home: bool, paired: bool,
+                   unlimited: float | None) -> None:
+        """Add position at home, limits and actuator to the joint of a drive; see ``tree``."""
+        p, branch, kind = self.parameters, self.legs[n].branch, self.kind
+        origin = branch.zero
+        if from_home:
+            origin = branch.home if kind.zero else 0.0
+        limits = [None if p[each] is None else float(p[each][n]) for each in kind.drive_limits]
+        ends, (rate, effort) = limits[:2], limits[2:]
+        if unlimited is not None or paired and ends != [None, None]:
+            ends = [wide if end is None else end
+                    for end, wide in zip(ends, branch.widest, strict=True)]
+        joint.position = branch.home - origin
+        joint.lower, joint.upper = (None if end is None else end - origin for end in ends)
+        joint.velocity_max, joint.force_max = rate or unlimited, effort or unlimited
+        joint.damping = float(p.actuator.viscous_friction[n])
+        joint.friction = float(p.actuator.coulomb_friction[n])
+        joint.armature = float(p[kind.fields['reflected_mass']][n])
+
+    def _mesh(self, part: str, uris: bool) -> tuple[VisualShape, ...]:
+        p = self.parameters
+        file: str = p[f'meshes.{part}'] if f'meshes.{part}' in p else ''
+        if not file or (not uris and '://' in file):
+            return ()
+        offset: Array = p[f'meshes.{part}_offset']
+        return (VisualShape('mesh', part, offset[:3], from_euler(offset[3:]), file=file,
+                            scale=p.meshes.scale),)
+
+    def solid(self, link: LegLink, body: MechanismBody) -> MechanismBody:
         """Return a leg's body with mass and inertia about all axes, as tools need it."""
-        mass = body.mass or _LEAST_MASS * self.platform_body.mass
+        mass = body.mass or _LEAST_MASS * (self.platform_body.mass or 0.0)
         moments = np.linalg.eigvalsh(body.inertia)
         if not link.slender and moments[0] > 0.0 and moments[:2].sum() >= moments[2]:
-            return body._replace(mass=mass)
+            return replace(body, mass=mass)
         across = float(body.inertia[0, 0] if link.slender else body.inertia[2, 2]) or (
             mass * (_LEAST_GYRATION * link.size) ** 2)
-        return body._replace(mass=mass, inertia=across * np.diag(
+        return replace(body, mass=mass, inertia=across * np.diag(
             [1.0, 1.0, AXIAL_INERTIA] if link.slender else [_HALF, _HALF, 1.0]))
 
-    def frame_body(self, name: str) -> RigidBody:
+    def frame_body(self, name: str) -> MechanismBody:
         """Return a body of a mass that has no influence, where a frame needs one."""
-        mass = _FRAME_MASS * self.platform_body.mass
-        return RigidBody(name, mass, np.zeros(3), mass * _FRAME_GYRATION ** 2 * np.eye(3))
-
-
-def _body(leg: str, link: LegLink) -> RigidBody:
-    return RigidBody(f'{leg}_{link.part}', link.mass, link.center, link.inertia)
+        mass = _FRAME_MASS * (self.platform_body.mass or 0.0)
+        return MechanismBody(name, HERE, mass, inertia=mass * _FRAME_GYRATION ** 2 * np.eye(3))
 
 
 Color = tuple[float, float, float, float]
@@ -209,39 +238,16 @@ COLORS: dict[str, Color] = {
     'joint': (0.12, 0.12, 0.12, 1.0)}
 
 
-def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[VisualShape, ...]]:
-    """Return the shapes of each body, by its name; without ``uris`` only meshes that are paths."""
-    p = hexapod.parameters
-    base, platform = p.geometry.base_joints, p.geometry.platform_joints
-    size = mean_radius(platform)
-    found = {}
-    for name, kind, joints in ((hexapod.base, 'base', base),
-                               (hexapod.platform, 'platform', platform)):
-        found[name] = _mesh(hexapod, kind, uris) or (_plate(kind, joints, PLATE * size), *(
-            VisualShape('sphere', 'joint', joint, np.eye(3), BALL * size) for joint in joints))
-    for leg in hexapod.legs:
-        for link, body in leg.links:
-            found[body.name] = _mesh(hexapod, link.part, uris) or link.shapes
-    return found
-
-
 def solids(looks: Sequence[VisualShape]) -> list[VisualShape]:
     """Return which shapes of a body others collide with: not the balls of its joints."""
     return [shape for shape in looks if shape.kind != 'sphere']
 
 
-def _plate(kind: str, joints: Array, thickness: float) -> VisualShape:
+def _plate(part: str, joints: Array, size: float) -> tuple[VisualShape, ...]:
+    """Return a plate under joints, and a ball at each; size: see ``LegKind.branches``."""
     center = joints.mean(axis=0)
     axes = level_axes(joints - center)
-    radius = float(np.linalg.norm((joints - center) @ axes[:2].T, axis=1).max())
-    return VisualShape('cylinder', kind, center, axes.T, max(radius, thickness), thickness)
-
-
-def _mesh(hexapod: Hexapod, kind: str, uris: bool) -> tuple[VisualShape, ...]:
-    p = hexapod.parameters
-    file: str = p[f'meshes.{kind}'] if f'meshes.{kind}' in p else ''
-    if not file or (not uris and '://' in file):
-        return ()
-    offset: Array = p[f'meshes.{kind}_offset']
-    return (VisualShape('mesh', kind, offset[:3], from_euler(offset[3:]), file=file,
-                        scale=p.meshes.scale),)
+    radius, thickness = np.linalg.norm((joints - center) @ axes[:2].T, axis=1).max(), PLATE * size
+    return (VisualShape('cylinder', part, center, axes.T, max(float(radius), thickness),
+                        thickness),
+            *(VisualShape('sphere', 'joint', joint, np.eye(3), BALL * size) for joint in joints))

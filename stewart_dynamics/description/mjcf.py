@@ -21,12 +21,11 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.hexapod import (
-    Hexapod, LegDescription, RigidBody, shapes)
-from stewart_dynamics.description.xml_text import (
-    add, base_element, CARRIED, carried, ELEMENT, numbers, position_elements, solid_elements,
-    text_of)
-from stewart_dynamics.legs.mechanism import SLIDE, UNIVERSAL
+from stewart_dynamics.description.carried import CARRIED, carried, ELEMENT
+from stewart_dynamics.description.hexapod import Hexapod, TreeBody
+from stewart_dynamics.description.xml_text import add, numbers, text_of
+from stewart_dynamics.legs.mechanism import (
+    FIXED, Joint, MechanismBody, OTHER, SLIDE, UNIVERSAL, WORLD)
 from stewart_dynamics.legs.tree import PLATE, VisualShape
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.parameters.table import mean_radius
@@ -60,25 +59,18 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     add(add(hexapods, 'default', class_=_COLLISION), 'geom', group='3', contype='1',
         conaffinity='0', mass='0')
     add(add(root, 'visual'), 'headlight', ambient='0.4 0.4 0.4', diffuse='0.5 0.5 0.5')
-    looks = shapes(hexapod, uris=False)  # MuJoCo knows paths alone
-    _assets(root, hexapod, looks)
-    world = add(root, 'worldbody')
-    base = add(world, 'body', name=hexapod.base_body, childclass=_CLASS)
-    _geoms(base, looks[hexapod.base])
-    for leg in hexapod.legs:
-        _leg(base, hexapod, leg, looks)
-    _platform(world, hexapod, looks[hexapod.platform])
+    tree = hexapod.tree(uris=False, paired=True)  # MuJoCo knows paths alone
+    _assets(root, hexapod, tree)
+    bodies = {WORLD: add(root, 'worldbody')}
+    for part in tree:
+        # The loops close at the platform, which is free until then.
+        carrier = WORLD if part.joint.kind == OTHER else part.joint.parent
+        bodies[part.body.name] = _body(bodies[carrier], hexapod, part)
     _loops(root, hexapod)
-    _actuators(root, hexapod)
-    add(add(root, 'keyframe'), 'key', name='home', qpos=numbers(*_home(hexapod)))
+    _actuators(root, hexapod, tree)
+    add(add(root, 'keyframe'), 'key', name='home', qpos=numbers(*_home(hexapod, tree)))
     custom = add(root, 'custom')
-    low, high = hexapod.kind.position_limits
-    unlimited = (low, high) if p[low] is p[high] else ()
-    elements = {**base_element(hexapod), **solid_elements(hexapod),
-                **position_elements(hexapod), **dict.fromkeys(unlimited)}
-    if p[hexapod.kind.effort_limit] is None:
-        elements[hexapod.kind.effort_limit] = None
-    for each, parameter in carried(p, elements, (hexapod.kind.rate_limit,)):
+    for each, parameter in carried(hexapod, tree, {}, (hexapod.kind.rate_limit,)):
         add(custom, 'text', name=f'{CARRIED}.{each}', data=parameter.value)
         if parameter.element:
             add(custom, 'text', name=f'{ELEMENT}.{each}', data=parameter.element)
@@ -111,56 +103,56 @@ def scene(hexapod: Hexapod, name: str) -> str:
     return text_of(root, 'A scene around the hexapod.')
 
 
-def _home(hexapod: Hexapod) -> list[Array]:
+def _home(hexapod: Hexapod, tree: Sequence[TreeBody]) -> list[Array]:
     """Return the positions of all joints at home, in MuJoCo's order."""
-    legs = [np.array([leg.at_home] if link.joint != UNIVERSAL else [0.0, 0.0])
-            for leg in hexapod.legs for link, _ in leg.links]
+    legs = [np.zeros(2) if part.joint.kind == UNIVERSAL else np.array([part.joint.position])
+            for part in tree if part.leg]
     x, y, z, w = to_quaternion(hexapod.rotation)
     return [*legs, hexapod.position, np.array([w, x, y, z])]
 
 
-def _leg(base: ET.Element, hexapod: Hexapod, leg: LegDescription,
-         looks: dict[str, tuple[VisualShape, ...]]) -> None:
-    add(base, 'site', name=f'{leg.name}_base_joint', pos=numbers(leg.base_joint))
-    parent = base
-    for link, body in leg.links:
-        at = {'pos': numbers(link.at_home.position), 'quat': _quaternion(link.at_home.rotation)}
-        if link.joint == UNIVERSAL:
-            # A body of its own has the turn of the mount: Drake takes the first of two joints of a
-            # body in axes of the body's parent.
-            parent = add(add(parent, 'body', name=leg.bearing, **at), 'body', name=body.name)
-            for joint, axis in zip(leg.universal, ('1 0 0', '0 1 0'), strict=True):
-                add(parent, 'joint', name=joint, type='hinge', axis=axis)
-        else:
-            if link.joint == SLIDE:
-                del at['quat']
-            parent = add(parent, 'body', name=body.name, **at)
-            _drive(parent, leg, link.joint)
-        _inertial(parent, hexapod.solid(link, body))
-        _geoms(parent, looks[body.name])
-    tip = add(parent, 'site', name=leg.tip)
-    if leg.branch.end.any():
-        tip.set('pos', numbers(leg.branch.end))
+def _body(carrier: ET.Element, hexapod: Hexapod, part: TreeBody) -> ET.Element:
+    leg, name, kind, place = part.leg, part.body.name, part.joint.kind, part.at_home
+    at = {} if leg else {'childclass': _CLASS}
+    if kind != FIXED:
+        at['pos'] = numbers(place.position)
+    if kind not in (FIXED, SLIDE):
+        at['quat'] = _quaternion(place.rotation)
+    if leg and part.joint.parent == hexapod.base_body:
+        add(carrier, 'site', name=f'{leg.name}_base_joint', pos=numbers(leg.base_joint))
+    if leg and kind == UNIVERSAL:
+        # A body of its own has the turn of the mount: Drake takes the first of two joints of a
+        # body in axes of the body's parent.
+        body = add(add(carrier, 'body', name=leg.bearing, **at), 'body', name=name)
+        for joint, axis in zip(leg.universal, ('1 0 0', '0 1 0'), strict=True):
+            add(body, 'joint', name=joint, type='hinge', axis=axis)
+    else:
+        body = add(carrier, 'body', name=name, **at)
+        if leg:
+            _drive(body, part.joint)
+        elif kind == OTHER:
+            add(body, 'freejoint', name=name)
+    if part.body.mass:
+        _inertial(body, part.body)
+    _geoms(body, part.shapes)
+    if leg and name == leg.last:
+        tip = add(body, 'site', name=leg.tip)
+        if leg.branch.end.any():
+            tip.set('pos', numbers(leg.branch.end))
+    if kind == OTHER:
+        for each in hexapod.legs:
+            add(body, 'site', name=each.ball, pos=numbers(each.platform_joint))
+    return body
 
 
-def _drive(body: ET.Element, leg: LegDescription, kind: str) -> None:
-    drive = add(body, 'joint', name=leg.name, type=kind, axis='0 0 1',
-                ref=numbers(leg.at_home),
-                armature=numbers(leg.reflected), damping=numbers(leg.viscous_friction),
-                frictionloss=numbers(leg.coulomb_friction), solreffriction=numbers(_SOLREF),
-                solimpfriction=numbers(SOLIMP), solreflimit=numbers(_SOLREF))
-    if leg.limits.lowest is not None or leg.limits.highest is not None:
-        drive.set('range', numbers(np.subtract(leg.bounds(), leg.branch.zero)))
-
-
-def _platform(world: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) -> None:
-    platform = add(world, 'body', name=hexapod.platform, childclass=_CLASS,
-                   pos=numbers(hexapod.position), quat=_quaternion(hexapod.rotation))
-    add(platform, 'freejoint', name=hexapod.platform)
-    _inertial(platform, hexapod.platform_body)
-    _geoms(platform, looks)
-    for leg in hexapod.legs:
-        add(platform, 'site', name=leg.ball, pos=numbers(leg.platform_joint))
+def _drive(body: ET.Element, joint: Joint) -> None:
+    drive = add(body, 'joint', name=joint.name, type=joint.kind, axis='0 0 1',
+                ref=numbers(joint.position), armature=numbers(joint.armature),
+                damping=numbers(joint.damping), frictionloss=numbers(joint.friction),
+                solreffriction=numbers(_SOLREF), solimpfriction=numbers(SOLIMP),
+                solreflimit=numbers(_SOLREF))
+    if joint.lower is not None:
+        drive.set('range', numbers(joint.lower, joint.upper))
 
 
 def _loops(root: ET.Element, hexapod: Hexapod) -> None:
@@ -169,7 +161,7 @@ def _loops(root: ET.Element, hexapod: Hexapod) -> None:
     for leg in hexapod.legs:
         # By bodies, as all readers know it, not by sites; on the platform the point is where it is
         # in the pose of the file.
-        add(equality, 'connect', name=leg.ball, body1=leg.last.name, body2=hexapod.platform,
+        add(equality, 'connect', name=leg.ball, body1=leg.last, body2=hexapod.platform,
             anchor=numbers(leg.branch.end), solref=numbers(SOLREF_LOOP), solimp=numbers(SOLIMP))
         if leg.drive.joint != SLIDE:
             continue
@@ -179,13 +171,14 @@ def _loops(root: ET.Element, hexapod: Hexapod) -> None:
         add(length, 'site', site=leg.ball)
 
 
-def _actuators(root: ET.Element, hexapod: Hexapod) -> None:
+def _actuators(root: ET.Element, hexapod: Hexapod, tree: Sequence[TreeBody]) -> None:
     actuators = add(root, 'actuator')
     sensors = add(root, 'sensor')
-    for leg in hexapod.legs:
-        motor = add(actuators, 'motor', name=leg.name, joint=leg.name)
-        if leg.limits.effort is not None:
-            motor.set('ctrlrange', numbers(-leg.limits.effort, leg.limits.effort))
+    for part in tree:
+        if part.leg and part.joint.kind != UNIVERSAL:
+            motor = add(actuators, 'motor', name=part.joint.name, joint=part.joint.name)
+            if part.joint.force_max is not None:
+                motor.set('ctrlrange', numbers(-part.joint.force_max, part.joint.force_max))
     kind = hexapod.kind
     for quantity, tag in ((kind.position, 'pos'), (kind.rate, 'vel')):
         for leg in hexapod.legs:
@@ -196,12 +189,11 @@ def _actuators(root: ET.Element, hexapod: Hexapod) -> None:
         add(sensors, 'actuatorfrc', name=f'{leg.name}_{kind.effort.name}', actuator=leg.name)
 
 
-def _assets(root: ET.Element, hexapod: Hexapod, looks: dict[str, tuple[VisualShape, ...]],
-            ) -> None:
+def _assets(root: ET.Element, hexapod: Hexapod, tree: Sequence[TreeBody]) -> None:
     assets = add(root, 'asset')
     for color, rgba in hexapod.colors.items():
         add(assets, 'material', name=color, rgba=numbers(rgba))
-    files = {shape.color: shape for each in looks.values() for shape in each if shape.file}
+    files = {shape.color: shape for part in tree for shape in part.shapes if shape.file}
     for kind, shape in files.items():
         add(assets, 'mesh', name=kind, file=shape.file, scale=numbers([shape.scale] * 3))
 
@@ -221,7 +213,7 @@ def _geoms(body: ET.Element, looks: Sequence[VisualShape]) -> None:
                 geom.set('size', numbers(shape.radius, 0.5 * shape.length))
 
 
-def _inertial(parent: ET.Element, body: RigidBody) -> None:
+def _inertial(parent: ET.Element, body: MechanismBody) -> None:
     i = body.inertia
     add(parent, 'inertial', pos=numbers(body.center), mass=numbers(body.mass),
         fullinertia=numbers(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.description.bounded_process import load_in_process, read_with
-from stewart_dynamics.description.xml_text import CARRIED, ELEMENT
+from stewart_dynamics.description.carried import CARRIED, ELEMENT
 from stewart_dynamics.legs.mechanism import (
     BALL, CarriedParameter, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER,
     Placement, SLIDE, WORLD)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from stewart_dynamics.description.carried import CARRIED
 from stewart_dynamics.description.sdf import DRAKE, POSITION
 from stewart_dynamics.description.xml_model import carried_of, Defaults, XmlModel
-from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.legs.mechanism import (
     DescriptionError, FIXED, HERE, Joint, Mechanism, MechanismBody, Placement, WORLD)
 

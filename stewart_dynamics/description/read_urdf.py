@@ -21,11 +21,11 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from stewart_dynamics.description.carried import CARRIED
 from stewart_dynamics.description.loops import loops_beside
 from stewart_dynamics.description.read_sdf import SDFORMAT
 from stewart_dynamics.description.xml_model import (
     carried_of, Defaults, kind_of, XmlModel)
-from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.legs.mechanism import HERE, Joint, Mechanism
 
 _CLOSING = re.compile('(closing_.+_)1')

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.carried import NOT_SET
 from stewart_dynamics.description.topology import LEGS, Topology, topology_of
-from stewart_dynamics.description.xml_text import NOT_SET
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.legs.leg_reading import passive

@@ -22,18 +22,16 @@ ignore.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.hexapod import (
-    Hexapod, LegDescription, RigidBody, shapes, solids)
-from stewart_dynamics.description.xml_text import (
-    add, base_element, CARRIED, carried, inertia_texts, numbers, solid_elements, text_of)
-from stewart_dynamics.legs.mechanism import SLIDE, UNIVERSAL
-from stewart_dynamics.legs.tree import LegLink, VisualShape
+from stewart_dynamics.description.carried import CARRIED, carried
+from stewart_dynamics.description.hexapod import Hexapod, LegDescription
+from stewart_dynamics.description.xml_text import add, numbers, text_of, XmlWriter
+from stewart_dynamics.legs.mechanism import BALL, FIXED, Joint, OTHER, UNIVERSAL
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 
@@ -51,25 +49,29 @@ def sdf(hexapod: Hexapod, name: str) -> str:
                               'xmlns:drake': DRAKE})
     model = add(root, 'model', name=name, canonical_link=hexapod.base_body)
     p = hexapod.parameters
-    _pose(model, np.zeros(3), upright(p.gravity))
+    writer = _SdfWriter(hexapod.colors)
+    writer.add_pose(model, np.zeros(3), upright(p.gravity))
     add(model, 'self_collide', 'false')
-    looks = shapes(hexapod)
-    base = _link(model, hexapod.base_body, '', np.zeros(3), np.eye(3))
-    _shapes(base, hexapod, looks[hexapod.base])
-    _joint(model, f'{hexapod.base_body}_to_world', 'fixed', 'world', hexapod.base_body)
+    tree = hexapod.tree(from_home=True)
+    for body, joint, at, _, looks, leg in tree:
+        link = writer.add_link(model, body.name, '' if joint.kind == FIXED else joint.parent,
+                               *at[::-1])
+        if body.mass:
+            writer.add_inertial(link, body)
+        writer.add_shapes(link, looks)
+        if joint.kind == OTHER:
+            continue
+        made = writer.add_joint(model, joint.name, joint.kind, joint.parent, body.name)
+        if joint.kind == UNIVERSAL:
+            for tag, along in (('axis', [1, 0, 0]), ('axis2', [0, 1, 0])):
+                writer.add_values(made, tag, xyz=along)
+        elif leg:
+            _complete_drive(writer, made, joint, not hexapod.kind.zero)
     for leg in hexapod.legs:
-        _leg(model, hexapod, leg, looks)
-    platform = _link(model, hexapod.platform, hexapod.base_body, hexapod.position,
-                     hexapod.rotation)
-    _inertial(platform, hexapod.platform_body)
-    _shapes(platform, hexapod, looks[hexapod.platform])
-    for leg in hexapod.legs:
-        _tip(model, hexapod, leg)
-    elements = {**base_element(hexapod), **solid_elements(hexapod),
-                'gravity': upright(p.gravity).T @ STANDARD_GRAVITY,
-                **{each: None for each in hexapod.kind.drive_limits if p[each] is None}}
+        _add_tip(writer, model, hexapod, leg)
+    gravity = upright(p.gravity).T @ STANDARD_GRAVITY
     zero = [hexapod.kind.zero] if hexapod.kind.zero else []
-    for each, parameter in carried(p, elements, zero):
+    for each, parameter in carried(hexapod, tree, {'gravity': gravity}, zero):
         add(model, f'{CARRIED}:parameter', name=each, **parameter._asdict())
     return text_of(root, _COMMENT)
 
@@ -88,108 +90,67 @@ def upright(gravity: Array) -> Array:
     return turn
 
 
-def _leg(model: ET.Element, hexapod: Hexapod, leg: LegDescription,
-         looks: dict[str, tuple[VisualShape, ...]]) -> None:
-    for link, body in leg.links:
-        parent = leg.carrier(link, hexapod.base_body)
-        made = _link(model, body.name, parent, *link.at_home[::-1])
-        _inertial(made, hexapod.solid(link, body))
-        _shapes(made, hexapod, looks[body.name])
-        if link.joint == UNIVERSAL:
-            universal = _joint(model, f'{leg.name}_universal', 'universal', parent, body.name)
-            for tag, along in (('axis', [1, 0, 0]), ('axis2', [0, 1, 0])):
-                add(add(universal, tag), 'xyz', numbers(along))
-        else:
-            _drive(model, hexapod, leg, link, parent)
-
-
-def _drive(model: ET.Element, hexapod: Hexapod, leg: LegDescription, link: LegLink, parent: str,
-           ) -> None:
-    drive = _joint(model, leg.name, 'prismatic' if link.joint == SLIDE else 'revolute', parent,
-                   f'{leg.name}_{link.part}')
-    add(drive, 'drake:rotor_inertia', numbers(leg.reflected))
+def _complete_drive(writer: _SdfWriter, drive: ET.Element, joint: Joint, positions: bool) -> None:
+    add(drive, 'drake:rotor_inertia', numbers(joint.armature))
     add(drive, 'drake:gear_ratio', numbers(1.0))
-    if not hexapod.kind.zero:
-        add(drive, f'{CARRIED}:position', numbers(leg.branch.home))
-    axis = add(drive, 'axis')
-    add(axis, 'xyz', numbers([0, 0, 1]))
-    limits, limit = leg.limits, add(axis, 'limit')
-    for tag, value in (('lower', limits.lowest), ('upper', limits.highest)):
-        if value is not None:
-            add(limit, tag, numbers(value - leg.branch.home))
-    for tag, value in (('effort', limits.effort), ('velocity', limits.rate)):
-        if value is not None:
-            add(limit, tag, numbers(value))
-    dynamics = add(axis, 'dynamics')
-    add(dynamics, 'damping', numbers(leg.viscous_friction))
-    add(dynamics, 'friction', numbers(leg.coulomb_friction))
+    if positions:
+        add(drive, f'{CARRIED}:position', numbers(joint.position))
+    axis, (lower, upper) = writer.add_values(drive, 'axis', xyz=[0, 0, 1]), joint.travel
+    writer.add_values(axis, 'limit', lower=lower, upper=upper, effort=joint.force_max,
+                      velocity=joint.velocity_max)
+    writer.add_values(axis, 'dynamics', damping=joint.damping, friction=joint.friction)
 
 
-def _tip(model: ET.Element, hexapod: Hexapod, leg: LegDescription) -> None:
+def _add_tip(writer: _SdfWriter, model: ET.Element, hexapod: Hexapod, leg: LegDescription,
+             ) -> None:
     """Write a ball joint, the tip that it leads to, and the plugin that fixes the tip."""
-    tip = _link(model, leg.tip, hexapod.platform, leg.platform_joint, np.eye(3))
-    _inertial(tip, hexapod.frame_body(leg.tip))
-    _joint(model, leg.ball, 'ball', leg.last.name, leg.tip)
+    tip = writer.add_link(model, leg.tip, hexapod.platform, leg.platform_joint)
+    writer.add_inertial(tip, hexapod.frame_body(leg.tip))
+    writer.add_joint(model, leg.ball, BALL, leg.last, leg.tip)
     fixes = add(model, 'plugin', filename='gz-sim-detachable-joint-system',
                 name='gz::sim::systems::DetachableJoint')
     add(fixes, 'parent_link', hexapod.platform)
     add(fixes, 'child_model', '__model__')
     add(fixes, 'child_link', leg.tip)
     closing = add(model, 'drake:ball_constraint')
-    for key, value in (('body_A', leg.last.name), ('body_B', hexapod.platform),
+    for key, value in (('body_A', leg.last), ('body_B', hexapod.platform),
                        ('p_AP', numbers(leg.branch.end)), ('p_BQ', numbers(leg.platform_joint))):
         add(closing, f'drake:ball_constraint_{key}', value)
 
 
-def _link(model: ET.Element, name: str, relative_to: str, position: Array, rotation: Array,
-          ) -> ET.Element:
-    link = add(model, 'link', name=name)
-    _pose(link, position, rotation, relative_to)
-    return link
+class _SdfWriter(XmlWriter):
+    """Values are elements."""
 
+    file = 'uri'
+    names = True
 
-def _joint(model: ET.Element, name: str, kind: str, parent: str, child: str) -> ET.Element:
-    joint = add(model, 'joint', name=name, type=kind)
-    add(joint, 'parent', parent)
-    add(joint, 'child', child)
-    return joint
+    def add_value(self, parent: ET.Element, tag: str, value: str, key: str = '') -> None:
+        """Add an element with a text."""
+        add(parent, tag, value)
 
+    def add_values(self, parent: ET.Element, tag: str, **values: Any) -> ET.Element:
+        """Add an element with elements; a value None has none."""
+        made = add(parent, tag)
+        for key, value in values.items():
+            if value is not None:
+                add(made, key, value if isinstance(value, str) else numbers(value))
+        return made
 
-def _pose(parent: ET.Element, position: Array, rotation: Array, relative_to: str = '') -> None:
-    pose = add(parent, 'pose', numbers(position, to_euler(rotation)))
-    if relative_to:
-        pose.set('relative_to', relative_to)
+    def add_pose(self, parent: ET.Element, position: Array, rotation: Array | None = None,
+                 relative_to: str = '') -> None:
+        """Add a pose, in the frame of the parent or another one."""
+        angles = np.zeros(3) if rotation is None else to_euler(rotation)
+        pose = add(parent, 'pose', numbers(position, angles))
+        if relative_to:
+            pose.set('relative_to', relative_to)
 
+    def add_material(self, visual: ET.Element, color: str) -> None:
+        """Add a color by its numbers."""
+        self.add_values(visual, 'material', ambient=self.colors[color], diffuse=self.colors[color])
 
-def _inertial(link: ET.Element, body: RigidBody) -> None:
-    inertial = add(link, 'inertial')
-    _pose(inertial, body.center, np.eye(3))
-    add(inertial, 'mass', numbers(body.mass))
-    inertia = add(inertial, 'inertia')
-    for tag, text in inertia_texts(body).items():
-        add(inertia, tag, text)
-
-
-def _shapes(link: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) -> None:
-    for kind, some in (('visual', looks), ('collision', solids(looks))):
-        for n, shape in enumerate(some, 1):
-            one = add(link, kind, name=f'{kind}_{n}')
-            _pose(one, shape.position, shape.rotation)
-            _geometry(one, shape)
-            if kind == 'visual':
-                material = add(one, 'material')
-                add(material, 'ambient', numbers(hexapod.colors[shape.color]))
-                add(material, 'diffuse', numbers(hexapod.colors[shape.color]))
-
-
-def _geometry(parent: ET.Element, shape: VisualShape) -> None:
-    geometry = add(parent, 'geometry')
-    if shape.kind == 'mesh':
-        mesh = add(geometry, 'mesh')
-        add(mesh, 'uri', shape.file)
-        add(mesh, 'scale', numbers([shape.scale] * 3))
-        return
-    solid = add(geometry, shape.kind)
-    add(solid, 'radius', numbers(shape.radius))
-    if shape.kind == 'cylinder':
-        add(solid, 'length', numbers(shape.length))
+    def add_link(self, model: ET.Element, name: str, relative_to: str, position: Array,
+                 rotation: Array | None = None) -> ET.Element:
+        """Add a link at a pose."""
+        link = add(model, 'link', name=name)
+        self.add_pose(link, position, rotation, relative_to)
+        return link

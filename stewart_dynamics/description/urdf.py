@@ -16,18 +16,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.carried import CARRIED, carried
 from stewart_dynamics.description.hexapod import (
-    Hexapod, LegDescription, massless, PASSIVE_RATE, RigidBody, shapes, solids, UNLIMITED)
-from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, center_elements, inertia_texts, numbers, position_elements,
-    solid_elements, text_of)
-from stewart_dynamics.legs.mechanism import Placement, SLIDE, UNIVERSAL
+    Hexapod, LegDescription, massless, PASSIVE_RATE, TreeBody, UNLIMITED)
+from stewart_dynamics.description.xml_text import add, numbers, text_of, XmlWriter
+from stewart_dynamics.legs.mechanism import (
+    FIXED, HINGE, MechanismBody, Placement, SLIDE, UNIVERSAL)
 from stewart_dynamics.legs.tree import VisualShape
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.kinematics.leg_joints import PLATFORM_JOINTS
@@ -66,23 +66,19 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None,
     root = ET.Element('robot')
     for color, rgba in hexapod.colors.items():
         add(add(root, 'material', name=color), 'color', rgba=numbers(rgba))
-    looks = shapes(hexapod)
-    _link(root, massless(hexapod.base), looks[hexapod.base])
-    frame = hexapod.frame_body if solid else massless
-    _platform(root, hexapod, frame, looks[hexapod.platform])
+    tree = hexapod.tree(hexapod.base, solid, unlimited=UNLIMITED)
+    base, *of_legs, platform = tree
+    writer = _UrdfWriter(hexapod, root, hexapod.frame_body if solid else massless)
+    writer.add_link(base.body, base.shapes)
+    writer.add_platform(platform)
     for leg in hexapod.legs:
-        _leg(root, hexapod, leg, frame, solid, looks)
+        writer.add_leg(leg, [part for part in of_legs if part.leg is leg])
     links = {link.get('name') for link in root.iter('link')}
     # Readers take the name of the robot as a frame, which would be that link's.
     root.set('name', f'{name}_hexapod' if name in links else name)
-    p = hexapod.parameters
     block = add(root, CARRIED)
-    kind = hexapod.kind
-    elements = {'gravity': STANDARD_GRAVITY, **position_elements(hexapod), **{
-        each: [UNLIMITED] * 6 for each in (kind.rate_limit, kind.effort_limit)
-        if p[each] is None}}
-    elements |= solid_elements(hexapod) if solid else center_elements(hexapod)
-    for each, parameter in carried(p, elements, (kind.fields['reflected_mass'],)):
+    without = hexapod.kind.fields['reflected_mass'],
+    for each, parameter in carried(hexapod, tree, {'gravity': STANDARD_GRAVITY}, without):
         add(block, 'parameter', name=each, **parameter._asdict())
     for leg in hexapod.legs:
         if constraints:
@@ -94,126 +90,111 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None,
     return text_of(root, _COMMENT)
 
 
-def _platform(root: ET.Element, hexapod: Hexapod, frame: Callable[[str], RigidBody],
-              looks: Sequence[VisualShape]) -> None:
-    """
-    Write the chain of virtual joints, the platform and the frames of its joints.
-
-    frame: makes the body of a link that is only a frame.
-    """
-    parent = hexapod.base
-    reach = sum(np.linalg.norm(joints, axis=1).max() for joints in (
-        hexapod.parameters.geometry.base_joints,
-        hexapod.parameters.geometry.platform_joints))
-    reach += max(leg.branch.reach for leg in hexapod.legs)
-    for each, name in zip(PLATFORM_JOINTS, hexapod.joints, strict=False):
-        axis, bound = _VIRTUAL.get(each, (each, reach))
-        child = hexapod.platform if each == PLATFORM_JOINTS[-1] else f'{name}_link'
-        if child == hexapod.platform:
-            _link(root, hexapod.platform_body, looks)
-        else:
-            _link(root, frame(child))
-        joint = _joint(root, name, 'revolute' if each in _VIRTUAL else 'prismatic', parent, child)
-        add(joint, 'axis', xyz=numbers(_AXES[axis]))
-        _limit(joint, (-bound, bound), PASSIVE_RATE, 0.0)
-        parent = child
-    for leg in hexapod.legs:
-        _link(root, massless(leg.ball))
-        _joint(root, f'{leg.ball}_fixed', 'fixed', hexapod.platform, leg.ball,
-               leg.platform_joint)
-
-
-def _leg(root: ET.Element, hexapod: Hexapod, leg: LegDescription,
-         frame: Callable[[str], RigidBody], solid: bool,
-         looks: dict[str, tuple[VisualShape, ...]]) -> None:
-    for link, body in leg.links:
-        if link.joint == UNIVERSAL:
-            _link(root, frame(leg.cross))
-        _link(root, hexapod.solid(link, body) if solid else body, looks[body.name])
-    for link, body in leg.links:
-        parent = leg.carrier(link, hexapod.base)
-        if link.joint == UNIVERSAL:
-            _universal(root, leg, parent, body.name, link.at_zero)
-        else:
-            _drive(root, leg, parent, body.name, link.at_zero)
-    if leg.branch.end.any():
-        _link(root, massless(leg.tip))
-        _joint(root, f'{leg.tip}_fixed', 'fixed', leg.last.name, leg.tip, leg.branch.end)
-
-
-def _universal(root: ET.Element, leg: LegDescription, parent: str, child: str, at: Placement,
-               ) -> None:
-    first = _joint(root, leg.universal[0], 'revolute', parent, leg.cross, at.position,
-                   at.rotation)
-    add(first, 'axis', xyz=numbers(_AXES['x']))
-    _limit(first, (-math.pi, math.pi), PASSIVE_RATE, 0.0)
-    second = _joint(root, leg.universal[1], 'revolute', leg.cross, child)
-    add(second, 'axis', xyz=numbers(_AXES['y']))
-    _limit(second, (-math.pi / 2, math.pi / 2), PASSIVE_RATE, 0.0)
-
-
-def _drive(root: ET.Element, leg: LegDescription, parent: str, child: str, at: Placement) -> None:
-    kind = 'prismatic' if leg.drive.joint == SLIDE else 'revolute'
-    drive = _joint(root, leg.name, kind, parent, child, at.position, at.rotation)
-    add(drive, 'axis', xyz=numbers(_AXES['z']))
-    lowest, highest = leg.bounds()
-    _limit(drive, (lowest - leg.branch.zero, highest - leg.branch.zero),
-           leg.limits.rate or UNLIMITED, leg.limits.effort or UNLIMITED)
-    add(drive, 'dynamics', damping=numbers(leg.viscous_friction),
-        friction=numbers(leg.coulomb_friction))
-
-
 def _constraint(root: ET.Element, hexapod: Hexapod, leg: LegDescription) -> None:
     closing = add(root, 'constraint', name=leg.ball, type='spherical')
-    for side, link, at in (('parent', leg.last.name, leg.branch.end),
+    for side, link, at in (('parent', leg.last, leg.branch.end),
                            ('child', hexapod.platform, leg.platform_joint)):
         add(closing, side, link=link)
         add(closing, f'{side}_origin', xyz=numbers(at), rpy=numbers(np.zeros(3)))
 
 
-def _link(root: ET.Element, body: RigidBody, looks: Sequence[VisualShape] = ()) -> None:
-    link = add(root, 'link', name=body.name)
-    # Zeros are written: some readers take 1 kg where there is no such element.
-    inertial = add(link, 'inertial')
-    add(inertial, 'origin', xyz=numbers(body.center))
-    add(inertial, 'mass', value=numbers(body.mass))
-    add(inertial, 'inertia', **inertia_texts(body))
-    for kind, some in (('visual', looks), ('collision', solids(looks))):
-        for shape in some:
-            one = add(link, kind)
-            _origin(one, shape.position, shape.rotation)
-            _geometry(one, shape)
-            if kind == 'visual':
-                add(one, 'material', name=shape.color)
+class _UrdfWriter(XmlWriter):
+    """
+    Values are attributes, and each joint has a limit and an axis.
 
+    frame: makes the body of a link that is only a frame.
+    """
 
-def _geometry(parent: ET.Element, shape: VisualShape) -> None:
-    geometry = add(parent, 'geometry')
-    if shape.kind == 'mesh':
-        add(geometry, 'mesh', filename=shape.file, scale=numbers([shape.scale] * 3))
-    elif shape.kind == 'sphere':
-        add(geometry, 'sphere', radius=numbers(shape.radius))
-    else:
-        add(geometry, 'cylinder', radius=numbers(shape.radius), length=numbers(shape.length))
+    file = 'filename'
+    names = False
 
+    def __init__(self, hexapod: Hexapod, root: ET.Element, frame: Callable[[str], MechanismBody],
+                 ) -> None:
+        super().__init__(hexapod.colors)
+        self._hexapod, self._root, self._frame = hexapod, root, frame
 
-def _joint(root: ET.Element, name: str, kind: str, parent: str, child: str,
-           position: Array | None = None, rotation: Array | None = None) -> ET.Element:
-    joint = add(root, 'joint', name=name, type=kind)
-    if position is not None:
-        _origin(joint, position, np.eye(3) if rotation is None else rotation)
-    add(joint, 'parent', link=parent)
-    add(joint, 'child', link=child)
-    return joint
+    def add_value(self, parent: ET.Element, tag: str, value: str, key: str = 'value') -> None:
+        """Add an element with an attribute."""
+        add(parent, tag, **{key: value})
 
+    def add_values(self, parent: ET.Element, tag: str, **values: Any) -> ET.Element:
+        """Add an element with attributes."""
+        return add(parent, tag, **{key: value if isinstance(value, str) else numbers(value)
+                                   for key, value in values.items()})
 
-def _origin(parent: ET.Element, position: Array, rotation: Array) -> None:
-    add(parent, 'origin', xyz=numbers(position), rpy=numbers(to_euler(rotation)))
+    def add_pose(self, parent: ET.Element, position: Array, rotation: Array | None = None) -> None:
+        """Add an origin."""
+        turn = {} if rotation is None else {'rpy': to_euler(rotation)}
+        self.add_values(parent, 'origin', xyz=position, **turn)
 
+    def add_material(self, visual: ET.Element, color: str) -> None:
+        """Add a color by its name."""
+        add(visual, 'material', name=color)
 
-def _limit(joint: ET.Element, bounds: tuple[float, float], rate: float, force: float) -> None:
-    add(joint, 'limit', lower=numbers(bounds[0]), upper=numbers(bounds[1]),
-        velocity=numbers(rate), effort=numbers(force))
+    def add_link(self, body: MechanismBody, looks: Sequence[VisualShape] = ()) -> None:
+        """Add a link; zeros are written: some readers take 1 kg where there is no such element."""
+        link = add(self._root, 'link', name=body.name)
+        self.add_inertial(link, body)
+        self.add_shapes(link, looks)
+
+    def add_fixed(self, name: str, parent: str, position: Array) -> None:
+        """Add a frame on a link."""
+        self.add_link(massless(name))
+        self.add_joint(self._root, f'{name}_fixed', FIXED, parent, name, position, np.eye(3))
+
+    def add_moving(self, name: str, kind: str, parent: str, child: str, axis: str,
+                   bounds: tuple[float | None, float | None], at: Placement | None = None,
+                   rate: float | None = PASSIVE_RATE, effort: float | None = 0.0,
+                   ) -> ET.Element:
+        """Add a joint about or along an axis, x, y or z; one without actuator by default."""
+        joint = self.add_joint(self._root, name, kind, parent, child,
+                               *((at.position, at.rotation) if at else ()))
+        self.add_values(joint, 'axis', xyz=_AXES[axis])
+        self.add_values(joint, 'limit', lower=bounds[0], upper=bounds[1], velocity=rate,
+                        effort=effort)
+        return joint
+
+    def add_platform(self, platform: TreeBody) -> None:
+        """Add the chain of virtual joints, the platform and the frames of its joints."""
+        hexapod, parent = self._hexapod, platform.joint.parent
+        geometry = hexapod.parameters.geometry
+        reach = sum(np.linalg.norm(joints, axis=1).max() for joints in (
+            geometry.base_joints, geometry.platform_joints))
+        reach += max(leg.branch.reach for leg in hexapod.legs)
+        for each, name in zip(PLATFORM_JOINTS, hexapod.joints, strict=False):
+            axis, bound = _VIRTUAL.get(each, (each, reach))
+            child = f'{name}_link'
+            if each == PLATFORM_JOINTS[-1]:
+                child = hexapod.platform
+                self.add_link(platform.body, platform.shapes)
+            else:
+                self.add_link(self._frame(child))
+            self.add_moving(name, HINGE if each in _VIRTUAL else SLIDE, parent, child, axis,
+                            (-bound, bound))
+            parent = child
+        for leg in hexapod.legs:
+            self.add_fixed(leg.ball, hexapod.platform, leg.platform_joint)
+
+    def add_leg(self, leg: LegDescription, parts: Sequence[TreeBody]) -> None:
+        """Add the bodies of a leg, its joints, and the frame at its end."""
+        for part in parts:
+            if part.joint.kind == UNIVERSAL:
+                self.add_link(self._frame(leg.cross))
+            self.add_link(part.body, part.shapes)
+        for part in parts:
+            name, made = part.body.name, part.joint
+            if made.kind == UNIVERSAL:
+                for joint, parent, child, axis, bound, at in (
+                        (leg.universal[0], made.parent, leg.cross, 'x', math.pi, part.at_zero),
+                        (leg.universal[1], leg.cross, name, 'y', math.pi / 2, None)):
+                    self.add_moving(joint, HINGE, parent, child, axis, (-bound, bound), at)
+            else:
+                drive = self.add_moving(
+                    leg.name, made.kind, made.parent, name, 'z', (made.lower, made.upper),
+                    part.at_zero, made.velocity_max, made.force_max)
+                self.add_values(drive, 'dynamics', damping=made.damping, friction=made.friction)
+        if leg.branch.end.any():
+            self.add_fixed(leg.tip, leg.last, leg.branch.end)
 
 
 def _ros2_control(root: ET.Element, hexapod: Hexapod, name: str, control: Ros2Control) -> None:
@@ -236,5 +217,5 @@ def _ros2_control(root: ET.Element, hexapod: Hexapod, name: str, control: Ros2Co
         for interface in ('position', 'velocity', 'effort'):
             state = add(joint, 'state_interface', name=interface)
             if interface == 'position':
-                add(state, 'param', numbers(leg.at_home),
+                add(state, 'param', numbers(leg.branch.home - leg.branch.zero),
                     name='initial_value')

@@ -20,6 +20,7 @@ parameters in full.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -27,12 +28,12 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.hexapod import (
-    Color, Hexapod, LegDescription, massless, RigidBody, shapes)
+from stewart_dynamics.description.carried import CARRIED, carried, tree_values
+from stewart_dynamics.description.hexapod import Color, Hexapod, LegDescription, TreeBody
 from stewart_dynamics.description.mjcf import SOLIMP, SOLREF_LOOP
-from stewart_dynamics.description.xml_text import CARRIED, carried, solid_elements
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.legs.mechanism import Placement, SLIDE, UNIVERSAL
+from stewart_dynamics.legs.mechanism import (
+    BALL, FIXED, HINGE, Joint, MechanismBody, OTHER, Placement, SLIDE, UNIVERSAL, WORLD)
 from stewart_dynamics.legs.tree import VisualShape
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 
@@ -42,6 +43,9 @@ if TYPE_CHECKING:
 _FREE = 179.0  # degrees; PhysX takes less than half a turn
 _LOCKED = 1.0, -1.0  # a lower limit above the upper one locks an axis
 LINEAR, ANGULAR = 'linear', 'angular'  # drives
+# The kinds of joints of UsdPhysics; one without a kind has six axes.
+_JOINTS = {FIXED: 'Fixed', UNIVERSAL: '', SLIDE: 'Prismatic', HINGE: 'Revolute', BALL: 'Spherical'}
+_ORIGIN = np.zeros(3)
 
 
 def armature(axis: str) -> tuple[str, ...]:
@@ -99,16 +103,26 @@ def usd(hexapod: Hexapod, name: str) -> str:
     scene.CreateGravityMagnitudeAttr(size)
     scene.CreateGravityDirectionAttr(Gf.Vec3f(*(gravity / size if size else (0.0, 0.0, -1.0))))
     writer = _Writer(stage, str(root.GetPath()), hexapod.colors)
-    looks = shapes(hexapod, uris=False)
-    writer.body(massless(hexapod.base_body), np.zeros(3), np.eye(3), looks[hexapod.base])
-    writer.joint('Fixed', f'{hexapod.base_body}_to_world', None, hexapod.base_body, np.zeros(3),
-                 np.eye(3), np.zeros(3))
-    writer.body(hexapod.platform_body, hexapod.position, hexapod.rotation,
-                looks[hexapod.platform])
-    for n, leg in enumerate(hexapod.legs):
-        _leg(writer, hexapod, leg, looks, excluded=n > 0)
+    tree = hexapod.tree(uris=False, from_home=True)
+    base, *of_legs, platform = tree
+    for part in (base, platform, *of_legs):
+        writer.add_body(part)
+        made = part.joint
+        if made.kind == OTHER:
+            continue
+        joint = writer.add_joint(made.kind, made.name, made.parent, made.child, part.at_home)
+        if made.kind == UNIVERSAL:
+            for axis in ('transX', 'transY', 'transZ', 'rotZ'):
+                writer.add_limit(joint, axis, *_LOCKED)
+            # Free in UsdPhysics, but locked in Newton without limits.
+            for axis in ('rotX', 'rotY'):
+                writer.add_limit(joint, axis, -_FREE, _FREE)
+        elif part.leg:
+            writer.add_drive(joint, made, not hexapod.kind.zero)
+        if part.leg and made.child == part.leg.last:
+            writer.close_loop(part.leg, part.body, platform.body, part.leg is not hexapod.legs[0])
     zero = [hexapod.kind.zero] if hexapod.kind.zero else []
-    for name, parameter in carried(hexapod.parameters, _elements(hexapod), zero):
+    for name, parameter in carried(hexapod, tree, _elements(hexapod, tree), zero):
         for prefix, value in ((VALUE, parameter.value), (ELEMENT, parameter.element)):
             if value:
                 root.GetPrim().CreateAttribute(
@@ -122,49 +136,13 @@ def attribute_name(prefix: str, name: str) -> str:
     return f'{prefix}:{name.replace(".", ":")}'
 
 
-def _elements(hexapod: Hexapod) -> dict[str, Any]:
+def _elements(hexapod: Hexapod, tree: Sequence[TreeBody]) -> dict[str, Any]:
     """Return the values of the attributes of the formats, before they are single-precision."""
-    p = hexapod.parameters
-    kind = hexapod.kind
-    found: dict[str, Any] = {
-        name: kind.expanded(p, name) for name in (*_EXACT, *kind.elements)} | solid_elements(
-            hexapod)
-    frames = {'base_frame': hexapod.base_body, 'platform_frame': hexapod.platform}
-    found |= {name: _prim(frame) for name, frame in frames.items() if _prim(frame) != p[name]}
-    # Readers add the position of a joint that is written, and count from home where it is not.
-    homes = np.array([leg.branch.home if kind.zero else 0.0 for leg in hexapod.legs])
-    found |= {name: None if p[name] is None else p[name] - (
-        homes if name in kind.position_limits else 0.0) for name in kind.drive_limits}
-    return found
-
-
-def _leg(writer: _Writer, hexapod: Hexapod, leg: LegDescription,
-         looks: dict[str, tuple[VisualShape, ...]], excluded: bool) -> None:
-    at = Placement(np.eye(3), np.zeros(3))
-    for link, body in leg.links:
-        at = at.of(link.at_home)
-        writer.body(hexapod.solid(link, body), at.position, at.rotation, looks[body.name])
-    for link, body in leg.links:
-        parent = leg.carrier(link, hexapod.base_body)
-        if link.joint == UNIVERSAL:
-            universal = writer.joint('', f'{leg.name}_universal', parent, body.name,
-                                     link.at_home.position, link.at_home.rotation, np.zeros(3))
-            for axis in ('transX', 'transY', 'transZ', 'rotZ'):
-                writer.limit(universal, axis, *_LOCKED)
-            # Free in UsdPhysics, but locked in Newton without limits.
-            for axis in ('rotX', 'rotY'):
-                writer.limit(universal, axis, -_FREE, _FREE)
-        else:
-            slides = link.joint == SLIDE
-            drive = writer.joint('Prismatic' if slides else 'Revolute', leg.name, parent,
-                                 body.name, link.at_home.position, link.at_home.rotation,
-                                 np.zeros(3))
-            writer.drive(drive, leg, LINEAR if slides else ANGULAR, not hexapod.kind.zero)
-    ball = writer.joint('Spherical', leg.ball, leg.last.name, hexapod.platform, leg.branch.end,
-                        at.rotation.T @ hexapod.rotation, leg.platform_joint)
-    ball.CreateExcludeFromArticulationAttr(excluded)
-    if excluded:
-        writer.stiff(ball)
+    p, kind = hexapod.parameters, hexapod.kind
+    frames = {'base_frame': _prim(hexapod.base_body), 'platform_frame': _prim(hexapod.platform)}
+    return {name: kind.expanded(p, name) for name in (*_EXACT, *kind.elements)} | {
+        name: value for name, value in (dict(tree_values(hexapod, tree)) | frames).items()
+        if name not in frames or value != p[name]}
 
 
 def _prim(name: str) -> str:
@@ -183,11 +161,11 @@ class _Writer:
         self._stage, self._root, self._colors = stage, root, colors
         self._gf, self._geom, self._physics = Gf, UsdGeom, UsdPhysics
 
-    def body(self, body: RigidBody, position: Array, rotation: Array,
-             looks: tuple[VisualShape, ...]) -> None:
+    def add_body(self, part: TreeBody) -> None:
         """Add a rigid body; one without mass is the base, fixed to the world."""
-        xform = self._geom.Xform.Define(self._stage, self._path(body.name))
-        self._place(xform, position, rotation)
+        body, path = part.body, self._path(part.body.name)
+        xform = self._geom.Xform.Define(self._stage, path)
+        self._place(xform, body.placement.position, body.placement.rotation)
         prim = xform.GetPrim()
         self._physics.RigidBodyAPI.Apply(prim)
         mass = self._physics.MassAPI.Apply(prim)
@@ -198,58 +176,58 @@ class _Writer:
         mass.CreateDiagonalInertiaAttr(self._gf.Vec3f(*(
             moments if body.mass else np.ones(3)).tolist()))
         mass.CreatePrincipalAxesAttr(self._quaternion(axes, self._gf.Quatf))
-        for n, shape in enumerate(looks):
-            self._shape(f'{self._path(body.name)}/shape_{n}', shape)
+        for n, shape in enumerate(part.shapes):
+            self._shape(f'{path}/shape_{n}', shape)
 
-    def joint(self, kind: str, name: str, first: str | None, second: str, position: Array,
-              rotation: Array, in_second: Array) -> Any:
+    def add_joint(self, kind: str, name: str, first: str, second: str, at: Placement,
+                  in_second: Array = _ORIGIN) -> Any:
         """
-        Add a joint of a kind of UsdPhysics, of six axes if empty; its axes are the second's.
+        Add a joint of a kind of ``mechanism``; its axes are the second body's.
 
-        position, rotation: of the joint in the first body, or in the world.
+        at: its place in the first body, or in the world. in_second: where it is in the second.
         """
-        define = getattr(self._physics, f'{kind}Joint').Define
+        define = getattr(self._physics, f'{_JOINTS[kind]}Joint').Define
         joint = define(self._stage, f'{self._root}/joints/{_prim(name)}')
-        if first is not None:
+        if first != WORLD:
             joint.CreateBody0Rel().SetTargets([self._path(first)])
         joint.CreateBody1Rel().SetTargets([self._path(second)])
-        joint.CreateLocalPos0Attr(self._gf.Vec3f(*position.tolist()))
-        joint.CreateLocalRot0Attr(self._quaternion(rotation, self._gf.Quatf))
+        joint.CreateLocalPos0Attr(self._gf.Vec3f(*at.position.tolist()))
+        joint.CreateLocalRot0Attr(self._quaternion(at.rotation, self._gf.Quatf))
         joint.CreateLocalPos1Attr(self._gf.Vec3f(*in_second.tolist()))
         joint.CreateLocalRot1Attr(self._gf.Quatf(1.0))
         return joint
 
-    def limit(self, joint: Any, axis: str, low: float, high: float) -> None:
+    def add_limit(self, joint: Any, axis: str, low: float, high: float) -> None:
         """Limit an axis of a joint."""
         limit = self._physics.LimitAPI.Apply(joint.GetPrim(), axis)
         limit.CreateLowAttr(low)
         limit.CreateHighAttr(high)
 
-    def drive(self, joint: Any, leg: LegDescription, axis: str, positions: bool) -> None:
+    def add_drive(self, joint: Any, made: Joint, positions: bool) -> None:
         """
         Add limits and actuator of a leg: an effort, its limit, friction and reflected mass.
 
-        axis: LINEAR or ANGULAR. positions: write the position of the joint.
+        positions: write the position of the joint.
         """
         from pxr import Sdf
 
-        unit = math.degrees(1.0) if axis == ANGULAR else 1.0
+        axis, unit = (LINEAR, 1.0) if made.kind == SLIDE else (ANGULAR, math.degrees(1.0))
         joint.CreateAxisAttr('Z')
-        for create, value in ((joint.CreateLowerLimitAttr, leg.limits.lowest),
-                              (joint.CreateUpperLimitAttr, leg.limits.highest)):
+        for create, value in zip((joint.CreateLowerLimitAttr, joint.CreateUpperLimitAttr),
+                                 made.travel, strict=True):
             if value is not None:
-                create((value - leg.branch.home) * unit)
+                create(value * unit)
         drive = self._physics.DriveAPI.Apply(joint.GetPrim(), axis)
         drive.CreateTypeAttr('force')
         drive.CreateStiffnessAttr(0.0)
-        drive.CreateDampingAttr(leg.viscous_friction / unit)
-        if leg.limits.effort is not None:
-            drive.CreateMaxForceAttr(leg.limits.effort)
+        drive.CreateDampingAttr(made.damping / unit)
+        if made.force_max is not None:
+            drive.CreateMaxForceAttr(made.force_max)
         for schema in (*_SCHEMAS, f'PhysxJointAxisAPI:{axis}'):
             joint.GetPrim().AddAppliedSchema(schema)
-        rate = None if leg.limits.rate is None else leg.limits.rate * unit
-        for keys, value in ((armature(axis), leg.reflected),
-                            (coulomb_friction(axis), leg.coulomb_friction),
+        rate = None if made.velocity_max is None else made.velocity_max * unit
+        for keys, value in ((armature(axis), made.armature),
+                            (coulomb_friction(axis), made.friction),
                             (rate_limit(axis), rate)):
             for key in keys:
                 if value is not None:
@@ -257,12 +235,23 @@ class _Writer:
                         key, Sdf.ValueTypeNames.Float, custom=False).Set(value)
         if positions:
             joint.GetPrim().CreateAttribute(POSITION, Sdf.ValueTypeNames.Double).Set(
-                leg.branch.home)
+                made.position)
 
-    def stiff(self, ball: Any) -> None:
-        """Make a joint that closes a loop as stiff in MuJoCo and Newton as it is in the MJCF."""
+    def close_loop(self, leg: LegDescription, last: MechanismBody, platform: MechanismBody,
+                   excluded: bool) -> None:
+        """
+        Add the joint of a leg at the platform.
+
+        excluded: it closes a loop, as stiff in MuJoCo and Newton as in the MJCF.
+        """
         from pxr import Sdf
 
+        turn = last.placement.rotation.T @ platform.placement.rotation
+        ball = self.add_joint(BALL, leg.ball, last.name, platform.name,
+                              Placement(turn, leg.branch.end), leg.platform_joint)
+        ball.CreateExcludeFromArticulationAttr(excluded)
+        if not excluded:
+            return
         ball.GetPrim().AddAppliedSchema(_EQUALITY)
         for key, values in (('mjc:solref', SOLREF_LOOP),
                             ('mjc:solimp', (*SOLIMP, *_MIDPOINT_POWER))):

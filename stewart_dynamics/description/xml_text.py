@@ -2,40 +2,32 @@
 # SPDX-License-Identifier: Apache-2.0
 
 
-"""XML as the writers need it: numbers that read back equal, elements, indented text."""
+"""XML as the writers need it: numbers that read back equal, elements, links and joints."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from stewart_dynamics import __version__
-from stewart_dynamics.description.hexapod import Hexapod, RigidBody
-from stewart_dynamics.legs.mechanism import CarriedParameter
-from stewart_dynamics.parameters.circles import CIRCLE_NAMES
-from stewart_dynamics.parameters.table import INERTIA, Parameters
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.hexapod import Color, solids
+from stewart_dynamics.legs.mechanism import (
+    BALL, FIXED, HINGE, MechanismBody, SLIDE, UNIVERSAL)
+from stewart_dynamics.legs.tree import VisualShape
+from stewart_dynamics.parameters.table import INERTIA
 
-CARRIED = 'stewart_dynamics'
-"""Name of the block, or prefix of the elements, of parameters without an own element."""
-ELEMENT = f'{CARRIED}.element'  # prefix in MJCF, which has texts with names alone
-# Parameters of all kinds that formats have elements for.
-_IN_ELEMENTS = frozenset((*CIRCLE_NAMES, 'geometry.base_joints', 'geometry.platform_joints'))
-_GROUPS = ('actuator.', 'drive.', 'geometry.', 'legs.', 'limits.')
-NOT_SET = 'none'  # value there of a limit that is not set, or of an element that is missing
+_KINDS = {FIXED: 'fixed', HINGE: 'revolute', SLIDE: 'prismatic', UNIVERSAL: 'universal',
+          BALL: 'ball'}
 
 
 def numbers(*values: Any) -> str:
     """Return numbers and arrays as text that reads back equal."""
     return ' '.join(repr(float(each) + 0.0) for value in values for each in np.ravel(value))
-
-
-def inertia_texts(body: RigidBody) -> dict[str, str]:
-    """Return the inertia of a body as text by its names."""
-    values = body.inertia[np.triu_indices(3)]
-    return {name: numbers(value) for name, value in zip(INERTIA, values, strict=True)}
 
 
 def add(parent: ET.Element, tag: str, text: str | None = None, **attributes: str) -> ET.Element:
@@ -54,66 +46,64 @@ def text_of(root: ET.Element, comment: str) -> str:
             f'{ET.tostring(root, encoding="unicode")}\n')
 
 
-def carried(parameters: Parameters, elements: Mapping[str, Any], without: Iterable[str] = (),
-            ) -> Iterator[tuple[str, CarriedParameter]]:
+class XmlWriter(ABC):
     """
-    Yield the parameters that a reader of a format's elements alone would not find.
+    Links, joints and shapes, by the rules that URDF and SDFormat have in common; see ``XmlModel``.
 
-    elements: those whose elements have another value, with that value; None: no element.
-    without: names of parameters that the format has no elements for. The given ones that no format
-    has elements for are added to them.
+    names: whether shapes have names. file: the key of the file of a mesh.
     """
-    kind = parameters.leg_kind
-    in_elements = {*_IN_ELEMENTS, *kind.elements, *kind.shortened, kind.zero, *kind.drive_limits}
-    for name, element in elements.items():
-        yield name, CarriedParameter(_text(kind.expanded(parameters, name)), _text(element))
-    for name in (*without, *(name for name in parameters.given
-                             if name.startswith(_GROUPS) and name not in in_elements)):
-        yield name, CarriedParameter(_text(kind.expanded(parameters, name)))
 
+    names: bool
+    file: str
 
-def base_element(hexapod: Hexapod) -> dict[str, Any]:
-    """Return the name of the base where its own is taken by the world of a format."""
-    return {} if hexapod.base_body == hexapod.base else {'base_frame': hexapod.base_body}
+    def __init__(self, colors: Mapping[str, Color]) -> None:
+        self.colors = colors
 
+    @abstractmethod
+    def add_value(self, parent: ET.Element, tag: str, value: str, key: str = 'value') -> None:
+        """Add an element with one value: its text, or an attribute ``key``."""
 
-def solid_elements(hexapod: Hexapod) -> dict[str, Any]:
-    """Return the masses and inertias that ``Hexapod.solid`` has for legs with zeros."""
-    found: dict[str, Any] = {}
-    for n, part in enumerate(hexapod.kind.parts):
-        links = [[*leg.links][n] for leg in hexapod.legs]
-        bodies = [hexapod.solid(*each) for each in links]
-        found[f'legs.{part}.mass'] = [body.mass for body in bodies]
-        found[f'legs.{part}.inertia'] = [
-            body.inertia[0, 0] if link.slender else body.inertia[np.triu_indices(3)]
-            for (link, _), body in zip(links, bodies, strict=True)]
-    return {name: values for name, values in found.items()
-            if not np.array_equal(values, hexapod.kind.expanded(hexapod.parameters, name))}
+    @abstractmethod
+    def add_values(self, parent: ET.Element, tag: str, **values: Any) -> ET.Element:
+        """Add an element with values, numbers or texts: elements within it, or attributes."""
 
+    @abstractmethod
+    def add_pose(self, parent: ET.Element, position: Array, rotation: Array | None = None) -> None:
+        """Add a position (3,) and rotation (3, 3) of an element, which is none if not given."""
 
-def center_elements(hexapod: Hexapod) -> dict[str, Any]:
-    """Return the centers of mass of legs of which some have no mass, and so no center."""
-    found: dict[str, Any] = {}
-    for part in hexapod.kind.parts:
-        name, mass = f'legs.{part}.center_of_mass', hexapod.parameters[f'legs.{part}.mass']
-        centers = hexapod.kind.expanded(hexapod.parameters, name)
-        if not mass.all():
-            found[name] = np.where((mass > 0.0).reshape(6, *[1] * (centers.ndim - 1)), centers,
-                                   0.0)
-    return found
+    @abstractmethod
+    def add_material(self, visual: ET.Element, color: str) -> None:
+        """Add one of ``Hexapod.colors``."""
 
+    def add_inertial(self, link: ET.Element, body: MechanismBody) -> None:
+        """Add mass, center of mass and inertia of a link."""
+        inertial = add(link, 'inertial')
+        self.add_pose(inertial, body.center)
+        self.add_value(inertial, 'mass', numbers(body.mass))
+        self.add_values(inertial, 'inertia', **dict(zip(
+            INERTIA, body.inertia[np.triu_indices(3)], strict=True)))
 
-def position_elements(hexapod: Hexapod) -> dict[str, Any]:
-    """Return the bounds of joints that stand for limits of the drives that are not set (6,)."""
-    bounds = np.array([leg.bounds() for leg in hexapod.legs])
-    bounds -= np.array([leg.branch.zero for leg in hexapod.legs])[:, None]
-    return {name: bounds[:, side] for side, name in enumerate(hexapod.kind.position_limits)
-            if hexapod.parameters[name] is None}
+    def add_shapes(self, link: ET.Element, looks: Sequence[VisualShape]) -> None:
+        """Add what a link looks like, and what others collide with."""
+        for kind, some in (('visual', looks), ('collision', solids(looks))):
+            for n, shape in enumerate(some, 1):
+                one = add(link, kind, **{'name': f'{kind}_{n}'} if self.names else {})
+                self.add_pose(one, shape.position, shape.rotation)
+                values: dict[str, Any] = {'radius': shape.radius, 'length': shape.length}
+                if shape.kind == 'mesh':
+                    values = {self.file: shape.file, 'scale': [shape.scale] * 3}
+                elif shape.kind == 'sphere':
+                    del values['length']
+                self.add_values(add(one, 'geometry'), shape.kind, **values)
+                if kind == 'visual':
+                    self.add_material(one, shape.color)
 
-
-def _text(value: Any) -> str:
-    if value is None:
-        return NOT_SET
-    if isinstance(value, tuple) and isinstance(value[0], str):
-        return ' '.join(value)
-    return value if isinstance(value, str) else numbers(value)
+    def add_joint(self, root: ET.Element, name: str, kind: str, parent: str, child: str,
+                  position: Array | None = None, rotation: Array | None = None) -> ET.Element:
+        """Add a joint of a kind of ``mechanism``, with a pose if there is a position."""
+        joint = add(root, 'joint', name=name, type=_KINDS[kind])
+        if position is not None:
+            self.add_pose(joint, position, rotation)
+        for side, link in (('parent', parent), ('child', child)):
+            self.add_value(joint, side, link, 'link')
+        return joint

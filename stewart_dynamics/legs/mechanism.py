@@ -115,6 +115,13 @@ class Joint:
     without: set[str] = field(default_factory=set)
     """Fields above that the file has, but not as a parameter can have them."""
 
+    @property
+    def travel(self) -> tuple[float | None, float | None]:
+        """Return its limits from where it is at the placements of the file, None if unlimited."""
+        low, high = (None if end is None else end - self.position
+                     for end in (self.lower, self.upper))
+        return low, high
+
     def bound(self, field: str, key: str, lower: float, upper: float) -> None:
         """Take a range of forces or rates as their largest value, if it is the smallest."""
         known: float | None = getattr(self, field)
