@@ -21,21 +21,17 @@ import pytest
 from referees import random_parameters, rng, ROOT
 from stewart_dynamics import Motion, Parameters, StewartError, StewartPlatform
 from stewart_dynamics.description import bounded_process as loading
-from stewart_dynamics.description.formats import read_hexapod
+from stewart_dynamics.description.formats import read_hexapod, WRITERS
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.loops import loops_name, loops_yaml
-from stewart_dynamics.description.mjcf import mjcf
 from stewart_dynamics.description.sdf import sdf, upright
-from stewart_dynamics.description.urdf import urdf
-from stewart_dynamics.description.usd import usd
-from stewart_dynamics.mechanics.frames.rotation import to_euler
+from stewart_dynamics.mechanics.frames.rotation import from_euler, to_euler, to_quaternion
 from stewart_dynamics.parameters.circles import CIRCLE_NAMES
 
 PROGRAM = 'stewart_describe'
 
 PLATFORM = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 CRANKS = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
-WRITERS = {'urdf': urdf, 'sdf': sdf, 'xml': mjcf, 'usda': usd}
 EXACT = 1e-12
 READ_BY = {'xml': 'mujoco', 'usda': 'pxr'}
 # Parameters that all formats have elements for.
@@ -235,6 +231,77 @@ def test_limits_that_are_inf_are_unlimited(kind, pattern, tmp_path):
     assert all(found[name] is None for name in PLATFORM.leg_kind.drive_limits)
 
 
+def quaternion_of(angles):
+    """Return a quaternion, which needs no length 1, of the text of three angles."""
+    turn = to_quaternion(from_euler([float(each) for each in angles.split()]))
+    return ' '.join(repr(float(each)) for each in 3.0 * turn)
+
+
+def with_quaternions(text):
+    """Return a URDF or SDFormat whose rotations are quaternions."""
+    root = ET.fromstring(text)
+    for origin in root.iter('origin'):
+        if origin.get('rpy'):
+            origin.set('quat_xyzw', quaternion_of(origin.attrib.pop('rpy')))
+    for pose in root.iter('pose'):
+        x, y, z, angles = pose.text.split(maxsplit=3)
+        pose.set('rotation_format', 'quat_xyzw')
+        pose.text = ' '.join([x, y, z, quaternion_of(angles)])
+    return ET.tostring(root, encoding='unicode')
+
+
+def with_frames(text):
+    """Return an SDFormat whose joints end at frames of links, of joints, and at the model's."""
+    root = ET.fromstring(text)
+    model = root.find('model')
+    ends = {'leg_2_tip': 'frame_2', 'base': '__model__', 'leg_1_cylinder': 'leg_1_universal'}
+    for end in (*model.iterfind('joint[@type="ball"]/child'), *model.iterfind('joint/parent')):
+        end.text = ends.get(end.text, end.text)
+    for name, attached_to in (('frame_2', 'frame_1'), ('frame_1', 'leg_2_tip')):
+        ET.SubElement(model, 'frame', {'name': name, 'attached_to': attached_to})
+    return ET.tostring(root, encoding='unicode')
+
+
+@pytest.mark.parametrize(('kind', 'change'), [
+    ('urdf', with_quaternions), ('sdf', with_quaternions), ('sdf', with_frames)])
+@pytest.mark.parametrize('p', [PLATFORM, CRANKS], ids=['telescopic', 'crank'])
+def test_quaternions_and_frames_at_joints_change_nothing(p, kind, change, tmp_path):
+    """As in URDF 1.1, and in SDFormat 1.9 and 1.8; libsdformat's own files read the same."""
+    (tmp_path / 'own').mkdir()
+    own = read_hexapod(written(p, kind, tmp_path / 'own'))
+    found = read_hexapod(written(p, kind, tmp_path, change))
+    assert found.remarks == own.remarks
+    check_all_else_stays(own.parameters, found.parameters)
+
+
+def test_the_model_of_a_world_with_most_joints_is_read(tmp_path):
+    """Worlds that Gazebo saves have models of ground and walls before the hexapod."""
+    def in_world(text):
+        root = ET.fromstring(text)
+        world = ET.Element('world', {'name': 'w'})
+        ET.SubElement(ET.SubElement(world, 'model', {'name': 'ground'}), 'link', {'name': 'link'})
+        ET.SubElement(world, 'gravity').text = '0 0 -1.62'
+        world.append(root.find('model'))
+        root.remove(root.find('model'))
+        root.append(world)
+        return ET.tostring(root, encoding='unicode')
+
+    found = read_hexapod(written(CRANKS, 'sdf', tmp_path, lambda text: in_world(foreign(text))))
+    assert found.parameters['gravity'] == pytest.approx([0.0, 0.0, -1.62])
+    assert found.parameters['legs.rod.length'] == pytest.approx(CRANKS['legs.rod.length'])
+
+
+@pytest.mark.parametrize('mass', ['', '<mass>2</mass>'])
+def test_inertia_that_engines_compute_from_shapes_is_named(mass, tmp_path, snapshot):
+    """SDFormat since 1.11; without the attribute a missing mass is 1 kg."""
+    found = read_hexapod(written(PLATFORM, 'sdf', tmp_path, lambda text: re.sub(
+        '(<link name="leg_2_piston">.*?)<inertial>.*?</inertial>',
+        rf'\g<1><inertial auto="true">{mass}</inertial>', foreign(text), flags=re.DOTALL)))
+    snapshot('\n'.join(each for each in found.remarks if 'leg_2' in each))
+    assert found.parameters['legs.piston.mass'][1] == (2.0 if mass else 0.0)
+    assert found.parameters['legs.piston.inertia'][1] == 0.0
+
+
 @pytest.mark.parametrize('kind', WRITERS)
 def test_an_edited_gravity_or_tilt_and_an_edited_name_are_read(kind, tmp_path):
     p = PLATFORM.replaced({'gravity': [0.0, 0.0, -1.62]})
@@ -361,6 +428,13 @@ def test_a_start_outside_the_limits_is_reported(tmp_path):
     '<sdf version="1.9"><model name="m"><joint name="j" type="fixed"><parent>a</parent></joint>'
     '</model></sdf>',
     '<sdf version="1.9"><world name="w"><include><uri>model://six</uri></include></world></sdf>',
+    '<robot name="x"><link name="a"/><link name="b"/><joint name="j" type="fixed">'
+    '<origin rpy="0 0 0" quat_xyzw="0 0 0 1"/><parent link="a"/><child link="b"/></joint></robot>',
+    '<sdf version="1.9"><model name="m"><link name="a"><pose rotation_format="quat_xyzw">'
+    '0 0 0 0 0 0 0</pose></link></model></sdf>',
+    '<sdf version="1.9"><model name="m"><link name="a"/><frame name="f" attached_to="g"/>'
+    '<frame name="g" attached_to="f"/><joint name="j" type="fixed"><parent>f</parent>'
+    '<child>a</child></joint></model></sdf>',
 ], ids=itertools.count())
 def test_a_file_without_a_hexapod_is_rejected_in_one_line(text, tmp_path, snapshot):
     path = tmp_path / 'file.xml'

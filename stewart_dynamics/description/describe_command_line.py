@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -87,11 +88,11 @@ def _interfaces(text: str) -> list[str]:
 
 def _write(given: argparse.Namespace, files: FilesOfFolder) -> int:
     # Imported here, so that --help is fast.
+    from stewart_dynamics.description.formats import WRITERS
     from stewart_dynamics.description.hexapod import Hexapod
     from stewart_dynamics.description.loops import loops_name, loops_yaml
-    from stewart_dynamics.description.mjcf import mjcf, scene
+    from stewart_dynamics.description.mjcf import scene
     from stewart_dynamics.description.picture import picture
-    from stewart_dynamics.description.sdf import sdf
     from stewart_dynamics.description.urdf import Ros2Control, urdf
     from stewart_dynamics.parameters.circles import CIRCLE_NAMES
     from stewart_dynamics.parameters.table import Parameters
@@ -101,17 +102,14 @@ def _write(given: argparse.Namespace, files: FilesOfFolder) -> int:
     if given.geometry_only:
         raise StewartError('--geometry-only: only with --from')
     hexapod, name = Hexapod(parameters), given.name or given.params.stem
-    control = None
-    if given.ros2_control is not None:
-        control = Ros2Control(given.ros2_control, given.hardware)
-    texts = {
-        f'{name}.urdf': urdf(hexapod, name, control, given.constraints, given.solid),
-        f'{name}.sdf': sdf(hexapod, name), f'{name}.xml': mjcf(hexapod, name),
+    control = given.ros2_control and Ros2Control(given.ros2_control, given.hardware)
+    writers = WRITERS | {'urdf': partial(
+        urdf, control=control, constraints=given.constraints, solid=given.solid)}
+    if not given.usd:
+        del writers['usda']
+    texts = {f'{name}.{suffix}': write(hexapod, name) for suffix, write in writers.items()} | {
         f'{name}.svg': picture(hexapod, name), loops_name(name): loops_yaml(hexapod, name),
         f'{name}_scene.xml': scene(hexapod, name)}
-    if given.usd:
-        from stewart_dynamics.description.usd import usd
-        texts[f'{name}.usda'] = usd(hexapod, name)
     if CIRCLE_NAMES & set(parameters.given):
         texts[f'{name}_points.yaml'] = parameters.with_points().yaml_text()
     for path in files.write(texts):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Files of other tools: their format, found in the file itself, and its reader."""
+"""Files of other tools: all formats, with their writers, and their readers by what a file has."""
 
 from __future__ import annotations
 
@@ -12,15 +12,23 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.mjcf import mjcf
 from stewart_dynamics.description.read_mjcf import read_mjcf
 from stewart_dynamics.description.read_sdf import read_sdf
 from stewart_dynamics.description.read_urdf import read_urdf
 from stewart_dynamics.description.read_usd import read_usd, SUFFIXES
 from stewart_dynamics.description.recognition import Recognized, recognized
+from stewart_dynamics.description.sdf import sdf
+from stewart_dynamics.description.urdf import urdf
+from stewart_dynamics.description.usd import usd
 from stewart_dynamics.errors import one_line
 from stewart_dynamics.legs.mechanism import DescriptionError, Mechanism
 from stewart_dynamics.whole_file import read_text
 
+WRITERS: dict[str, Callable[[Hexapod, str], str]] = {
+    'urdf': urdf, 'sdf': sdf, 'xml': mjcf, 'usda': usd}
+"""Writers of a hexapod as a model of a name, by the suffix of its file."""
 # Readers of XML by the root element.
 _READERS: dict[str, Callable[[ET.Element, Path], Mechanism]] = {
     'robot': read_urdf, 'sdf': read_sdf, 'gazebo': read_sdf,

@@ -9,6 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import numpy as np
+
 from stewart_dynamics.description.carried import CARRIED
 from stewart_dynamics.description.sdf import DRAKE, POSITION
 from stewart_dynamics.description.xml_model import carried_of, Defaults, XmlModel
@@ -22,19 +24,20 @@ _MODEL = '__model__'
 _DETACHABLE = '::systems::DetachableJoint'
 # Before this version axes are in the frame of the model, not of the joint.
 _JOINT_AXES = (1, 5)
-_OFF = ('0', 'false')
+_ON, _OFF = ('1', 'true'), ('0', 'false')
 # In the names of systems that exert forces on links.
 _FORCES = 'buoyancy', 'hydrodynamics', 'liftdrag', 'spring', 'wind', 'thruster', 'applylinkwrench'
 
 
 def read_sdf(root: ET.Element, source: Path) -> Mechanism:
-    """Return the mechanism of the model with most prismatic joints."""
-    model = max(root.iter('model'), default=None, key=lambda each: sum(
-        joint.get('type') == 'prismatic' for joint in each.findall('joint')))
+    """Return the mechanism of the model with most prismatic joints, or most joints at all."""
+    model = max(root.iter('model'), default=None, key=lambda each: (
+        sum(joint.get('type') == 'prismatic' for joint in each.findall('joint')),
+        len(each.findall('joint'))))
     if model is None:
-        included = root.find('.//include') is not None
+        included = ', '.join(each.findtext('uri', '').strip() for each in root.iter('include'))
         raise DescriptionError(f'{source}: no model' + (
-            ', but included ones: read the file of the model' if included else ''))
+            f', but included ones, {included}: read the file of the model' if included else ''))
     reader = _SdfModel(model, _version(root), source)
     joints = [reader.placed_joint(joint) for joint in model.findall('joint')]
     fixed = [reader.fixed(plugin) for plugin in model.findall('plugin')
@@ -76,6 +79,12 @@ class _SdfModel(XmlModel):
         super().__init__(source, [*links, WORLD], SDFORMAT, {WORLD: HERE})
         self._placements |= dict.fromkeys(('', _MODEL), self.pose(model))
         self._axes_in_model = version < _JOINT_AXES
+        # Joints may end at frames: since 1.8, of links, of other frames, of joints or of the model.
+        self._attached = {each.get('name', ''): each.get('attached_to', _MODEL)
+                          for each in model.findall('frame')}
+        self._attached |= {each.get('name', ''): each.findtext('child', '').strip()
+                           for each in model.findall('joint')}
+        self._attached[_MODEL] = model.get('canonical_link') or next(iter(links), '')
         for each in model:
             if each.tag in ('link', 'joint', 'frame'):
                 pose = each.find('pose')
@@ -88,6 +97,12 @@ class _SdfModel(XmlModel):
     def body(self, link: ET.Element) -> MechanismBody:
         """Return a link as a body, with the forces on it that have no parameter."""
         made, inertial = super().body(link), link.find('inertial')
+        if inertial is not None and inertial.get('auto') in _ON:
+            made.mass = self.number(inertial, made.name, None, 'mass')
+            made.inertia = np.zeros((3, 3))
+            made.note = f'{made.name}: inertial auto: engines compute ' + (
+                'mass and inertia from its shapes: not read' if made.mass is None
+                else 'its inertia from its shapes: 0 kg m^2 here')
         if link.findtext('gravity', '').strip() in _OFF:
             made.weightless = 'gravity switched off'
         if link.find('velocity_decay') is not None:
@@ -108,7 +123,7 @@ class _SdfModel(XmlModel):
         """Return the frame of an axis, by the rule of the version."""
         xyz = axis.find('xyz')
         if self._axes_in_model or axis.findtext(
-                'use_parent_model_frame', '').strip() in ('1', 'true'):
+                'use_parent_model_frame', '').strip() in _ON:
             return self.place(_MODEL)
         frame = None if xyz is None else xyz.get('expressed_in')
         return self.place(frame) if frame else at

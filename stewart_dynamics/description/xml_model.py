@@ -21,7 +21,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.legs.mechanism import (
     BALL, CarriedParameter, DescriptionError, FIXED, HERE, HINGE, Joint, MechanismBody, OTHER,
     Placement, SLIDE, UNIVERSAL)
-from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.mechanics.frames.rotation import from_euler, from_quaternion
 from stewart_dynamics.parameters.table import INERTIA, inertia_matrix
 
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
@@ -29,6 +29,7 @@ _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': S
 _LIMITS = {'lower': 'lower', 'upper': 'upper', 'velocity': 'velocity_max', 'effort': 'force_max'}
 # Unlimited: SDFormat's default is 1e16 or, from version 1.10 on, inf.
 _UNLIMITED, _INFINITE = 1e15, ('inf', '+inf', '-inf')
+_QUATERNION = 'quat_xyzw'  # in URDF since 1.1, in SDFormat since 1.9
 _Default = TypeVar('_Default', bound=float | None)
 
 
@@ -52,8 +53,10 @@ class XmlModel:
 
     def __init__(self, source: Path, links: Iterable[str], defaults: Defaults,
                  placements: dict[str, Placement]) -> None:
-        self.source, self._links, self._defaults = source, {*links}, defaults
+        self.source, self._defaults = source, defaults
         self._placements = placements
+        self._links = {link: link for link in links}  # and of frames, once they are looked up
+        self._attached: dict[str, str] = {}  # frames, and what each is attached to
         self._frames: dict[str, tuple[str, Placement]] = {}
 
     def error(self, why: str) -> DescriptionError:
@@ -111,29 +114,53 @@ class XmlModel:
         given = element.find(origin)
         what = f'{element.tag} {element.get("name", "")!r}'
         if given is not None:
-            xyz, rpy = (self.numbers(given.get(key), 3, f'{origin} of {what}')
-                        for key in ('xyz', 'rpy'))
-            return Placement(from_euler(rpy), xyz)
+            what, turn = f'{origin} of {what}', given.get(_QUATERNION)
+            if turn is not None and given.get('rpy') is not None:
+                raise self.error(f'{what}: must have rpy or {_QUATERNION}, not both')
+            return self._placement(self.numbers(given.get('xyz'), 3, what), self.numbers(
+                given.get('rpy') or turn, 3 if turn is None else 4, what), what)
         given = element.find('pose')
         if given is None or not (given.text or '').strip():
             return HERE
-        values = self.numbers(given.text, 6, f'pose of {what}')
-        angles = np.pi / 180.0 if given.get('degrees') in ('1', 'true') else 1.0
-        return Placement(from_euler(angles * values[3:]), values[:3])
+        what, quaternion = f'pose of {what}', given.get('rotation_format') == _QUATERNION
+        values = self.numbers(given.text, 7 if quaternion else 6, what)
+        in_degrees = not quaternion and given.get('degrees') in ('1', 'true')
+        return self._placement(
+            values[:3], values[3:] * (np.pi / 180.0 if in_degrees else 1.0), what)
+
+    def _placement(self, at: Array, turn: Array, what: str) -> Placement:
+        """Return a placement turned by three angles [rad], or by a quaternion x y z w."""
+        if len(turn) == 3:
+            return Placement(from_euler(turn), at)
+        size = float(np.linalg.norm(turn))
+        if size == 0.0:
+            raise self.error(f'{what}: the quaternion is zero')
+        return Placement(np.reshape(from_quaternion(*turn / size), (3, 3)), at)
 
     def link(self, name: str, what: str) -> str:
-        """Return the name of a link; ``what`` begins the error that the model has no such link."""
-        if name not in self._links:
-            raise self.error(f'{what}: no link {name!r}')
-        return name
+        """
+        Return the name of a link, given by its name or that of a frame that is attached to it.
+
+        what: begins the error that the model has no such link.
+        """
+        waiting: dict[str, None] = {}  # frames, each attached to the next
+        end = name
+        while end not in self._links:
+            if end in waiting or end not in self._attached:
+                raise self.error(f'{what}: no link {name!r}')
+            waiting[end] = None
+            end = self._attached[end]
+        self._links |= dict.fromkeys(waiting, self._links[end])
+        return self._links[end]
 
     def end(self, joint: ET.Element, side: str) -> str:
-        """Return the link at a side of a joint, parent or child."""
+        """Return the name of the link, or frame, at a side of a joint, parent or child."""
         end, what = joint.find(side), f'{joint.tag} {joint.get("name", "")!r}'
         name = None if end is None else end.get('link') or (end.text or '').strip()
         if not name:
             raise self.error(f'{what}: no {side}')
-        return self.link(name, what)
+        self.link(name, what)
+        return name
 
     def body(self, link: ET.Element) -> MechanismBody:
         """Return a link as a body."""
@@ -163,8 +190,8 @@ class XmlModel:
         """
         defaults = defaults or self._defaults
         name, kind = joint.get('name', ''), kind_of(joint)
-        made = Joint(name, kind, self.end(joint, 'parent'), self.end(joint, 'child'), at.position,
-                     position=position)
+        parent, child = (self.link(self.end(joint, side), name) for side in ('parent', 'child'))
+        made = Joint(name, kind, parent, child, at.position, position=position)
         axes = [each for each in (joint.find('axis'), joint.find('axis2')) if each is not None]
         if kind in (HINGE, SLIDE, UNIVERSAL):
             made.axes = [self.axis_frame(axis, at).rotation @ self.unit(
