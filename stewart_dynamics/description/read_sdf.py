@@ -79,7 +79,7 @@ class _SdfModel(XmlModel):
         super().__init__(source, [*links, WORLD], SDFORMAT, {WORLD: HERE})
         self._placements |= dict.fromkeys(('', _MODEL), self.pose(model))
         self._axes_in_model = version < _JOINT_AXES
-        # Joints may end at frames: since 1.8, of links, of other frames, of joints or of the model.
+        # Since 1.8 joints may end at frames, of links, other frames, joints or the model.
         self._attached = {each.get('name', ''): each.get('attached_to', _MODEL)
                           for each in model.findall('frame')}
         self._attached |= {each.get('name', ''): each.findtext('child', '').strip()
