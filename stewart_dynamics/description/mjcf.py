@@ -16,6 +16,7 @@ micrometres in motion. Coulomb friction is such a constraint, too.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -49,8 +50,8 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     root = ET.Element('mujoco', {'model': name})
     p = hexapod.parameters
     add(root, 'compiler', angle='radian', autolimits='true')
-    add(root, 'option', timestep=numbers(_TIMESTEP), gravity=numbers(p.gravity),
-        integrator='implicitfast', solver='Newton', tolerance=numbers(_TOLERANCE))
+    add(root, 'option', timestep=_TIMESTEP, gravity=p.gravity,
+        integrator='implicitfast', solver='Newton', tolerance=_TOLERANCE)
     # Other bodies collide with the hexapod, but its parts do not collide with each other.
     hexapods = add(add(root, 'default'), 'default', class_=_CLASS)
     # Groups as in MuJoCo Menagerie.
@@ -71,9 +72,9 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     add(add(root, 'keyframe'), 'key', name='home', qpos=numbers(*_home(hexapod, tree)))
     custom = add(root, 'custom')
     for each, parameter in carried(hexapod, tree, {}, (hexapod.kind.rate_limit,)):
-        add(custom, 'text', name=f'{CARRIED}.{each}', data=parameter.value)
-        if parameter.element:
-            add(custom, 'text', name=f'{ELEMENT}.{each}', data=parameter.element)
+        for prefix, value in ((CARRIED, parameter.value), (ELEMENT, parameter.element)):
+            if value:
+                add(custom, 'text', name=f'{prefix}.{each}', data=value)
     effort = hexapod.kind.effort
     return text_of(root, _COMMENT.format(
         effort=effort.name, unit=effort.unit, does=effort.positive.removeprefix('+ ')))
@@ -84,7 +85,7 @@ def scene(hexapod: Hexapod, name: str) -> str:
     root = ET.Element('mujoco', {'model': f'{name}_scene'})
     add(root, 'include', file=f'{name}.xml')
     size = mean_radius(hexapod.parameters.geometry.base_joints)
-    add(root, 'statistic', center=numbers(0.5 * hexapod.position), extent=numbers(3.0 * size))
+    add(root, 'statistic', center=0.5 * hexapod.position, extent=3.0 * size)
     assets = add(root, 'asset')
     add(assets, 'texture', type='skybox', builtin='gradient', rgb1='0.3 0.5 0.7', rgb2='0 0 0',
         width='512', height='3072')
@@ -95,11 +96,11 @@ def scene(hexapod: Hexapod, name: str) -> str:
     gravity = hexapod.parameters.gravity
     up = -gravity / np.linalg.norm(gravity) if gravity.any() else np.array([0.0, 0.0, 1.0])
     above = hexapod.position + 4.0 * size * up
-    add(world, 'light', pos=numbers(above), dir=numbers(-up), type='directional')
+    add(world, 'light', pos=above, dir=-up, type='directional')
     lowest = min(float(each @ up) for each in (
         *hexapod.parameters.geometry.base_joints, hexapod.position - 2.0 * size * np.abs(up)))
     add(world, 'geom', name='floor', type='plane', size='0 0 0.05', material='floor',
-        pos=numbers((lowest - PLATE * size) * up), zaxis=numbers(up))
+        pos=(lowest - PLATE * size) * up, zaxis=up)
     return text_of(root, 'A scene around the hexapod.')
 
 
@@ -107,19 +108,18 @@ def _home(hexapod: Hexapod, tree: Sequence[TreeBody]) -> list[Array]:
     """Return the positions of all joints at home, in MuJoCo's order."""
     legs = [np.zeros(2) if part.joint.kind == UNIVERSAL else np.array([part.joint.position])
             for part in tree if part.leg]
-    x, y, z, w = to_quaternion(hexapod.rotation)
-    return [*legs, hexapod.position, np.array([w, x, y, z])]
+    return [*legs, hexapod.position, _quaternion(hexapod.rotation)]
 
 
 def _body(carrier: ET.Element, hexapod: Hexapod, part: TreeBody) -> ET.Element:
     leg, name, kind, place = part.leg, part.body.name, part.joint.kind, part.at_home
-    at = {} if leg else {'childclass': _CLASS}
+    at: dict[str, Any] = {} if leg else {'childclass': _CLASS}
     if kind != FIXED:
-        at['pos'] = numbers(place.position)
+        at['pos'] = place.position
     if kind not in (FIXED, SLIDE):
         at['quat'] = _quaternion(place.rotation)
     if leg and part.joint.parent == hexapod.base_body:
-        add(carrier, 'site', name=f'{leg.name}_base_joint', pos=numbers(leg.base_joint))
+        add(carrier, 'site', name=f'{leg.name}_base_joint', pos=leg.base_joint)
     if leg and kind == UNIVERSAL:
         # A body of its own has the turn of the mount: Drake takes the first of two joints of a
         # body in axes of the body's parent.
@@ -136,23 +136,18 @@ def _body(carrier: ET.Element, hexapod: Hexapod, part: TreeBody) -> ET.Element:
         _inertial(body, part.body)
     _geoms(body, part.shapes)
     if leg and name == leg.last:
-        tip = add(body, 'site', name=leg.tip)
-        if leg.branch.end.any():
-            tip.set('pos', numbers(leg.branch.end))
+        add(body, 'site', name=leg.tip, pos=leg.branch.end if leg.branch.end.any() else None)
     if kind == OTHER:
         for each in hexapod.legs:
-            add(body, 'site', name=each.ball, pos=numbers(each.platform_joint))
+            add(body, 'site', name=each.ball, pos=each.platform_joint)
     return body
 
 
 def _drive(body: ET.Element, joint: Joint) -> None:
-    drive = add(body, 'joint', name=joint.name, type=joint.kind, axis='0 0 1',
-                ref=numbers(joint.position), armature=numbers(joint.armature),
-                damping=numbers(joint.damping), frictionloss=numbers(joint.friction),
-                solreffriction=numbers(_SOLREF), solimpfriction=numbers(SOLIMP),
-                solreflimit=numbers(_SOLREF))
-    if joint.lower is not None:
-        drive.set('range', numbers(joint.lower, joint.upper))
+    add(body, 'joint', name=joint.name, type=joint.kind, axis='0 0 1', ref=joint.position,
+        armature=joint.armature, damping=joint.damping, frictionloss=joint.friction,
+        solreffriction=_SOLREF, solimpfriction=SOLIMP, solreflimit=_SOLREF,
+        range=None if joint.lower is None else (joint.lower, joint.upper))
 
 
 def _loops(root: ET.Element, hexapod: Hexapod) -> None:
@@ -162,7 +157,7 @@ def _loops(root: ET.Element, hexapod: Hexapod) -> None:
         # By bodies, as all readers know it, not by sites; on the platform the point is where it is
         # in the pose of the file.
         add(equality, 'connect', name=leg.ball, body1=leg.last, body2=hexapod.platform,
-            anchor=numbers(leg.branch.end), solref=numbers(SOLREF_LOOP), solimp=numbers(SOLIMP))
+            anchor=leg.branch.end, solref=SOLREF_LOOP, solimp=SOLIMP)
         if leg.drive.joint != SLIDE:
             continue
         # It has no stiffness: it measures the length from joint to joint.
@@ -176,9 +171,9 @@ def _actuators(root: ET.Element, hexapod: Hexapod, tree: Sequence[TreeBody]) -> 
     sensors = add(root, 'sensor')
     for part in tree:
         if part.leg and part.joint.kind != UNIVERSAL:
-            motor = add(actuators, 'motor', name=part.joint.name, joint=part.joint.name)
-            if part.joint.force_max is not None:
-                motor.set('ctrlrange', numbers(-part.joint.force_max, part.joint.force_max))
+            name, most = part.joint.name, part.joint.force_max
+            add(actuators, 'motor', name=name, joint=name,
+                ctrlrange=None if most is None else (-most, most))
     kind = hexapod.kind
     for quantity, tag in ((kind.position, 'pos'), (kind.rate, 'vel')):
         for leg in hexapod.legs:
@@ -192,33 +187,29 @@ def _actuators(root: ET.Element, hexapod: Hexapod, tree: Sequence[TreeBody]) -> 
 def _assets(root: ET.Element, hexapod: Hexapod, tree: Sequence[TreeBody]) -> None:
     assets = add(root, 'asset')
     for color, rgba in hexapod.colors.items():
-        add(assets, 'material', name=color, rgba=numbers(rgba))
+        add(assets, 'material', name=color, rgba=rgba)
     files = {shape.color: shape for part in tree for shape in part.shapes if shape.file}
     for kind, shape in files.items():
-        add(assets, 'mesh', name=kind, file=shape.file, scale=numbers([shape.scale] * 3))
+        add(assets, 'mesh', name=kind, file=shape.file, scale=[shape.scale] * 3)
 
 
 def _geoms(body: ET.Element, looks: Sequence[VisualShape]) -> None:
     for shape in looks:
         for kind in (_VISUAL,) if shape.kind == 'sphere' else (_VISUAL, _COLLISION):
-            geom = add(body, 'geom', class_=kind, type=shape.kind, pos=numbers(shape.position),
-                       quat=_quaternion(shape.rotation))
-            if kind == _VISUAL:
-                geom.set('material', shape.color)
-            if shape.kind == 'mesh':
-                geom.set('mesh', shape.color)
-            elif shape.kind == 'sphere':
-                geom.set('size', numbers(shape.radius))
-            else:
-                geom.set('size', numbers(shape.radius, 0.5 * shape.length))
+            add(body, 'geom', class_=kind, type=shape.kind, pos=shape.position,
+                quat=_quaternion(shape.rotation),
+                material=shape.color if kind == _VISUAL else None,
+                mesh=shape.color if shape.file else None, size={
+                    'sphere': shape.radius,
+                    'cylinder': (shape.radius, 0.5 * shape.length)}.get(shape.kind))
 
 
 def _inertial(parent: ET.Element, body: MechanismBody) -> None:
     i = body.inertia
-    add(parent, 'inertial', pos=numbers(body.center), mass=numbers(body.mass),
-        fullinertia=numbers(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))
+    add(parent, 'inertial', pos=body.center, mass=body.mass,
+        fullinertia=(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))
 
 
-def _quaternion(rotation: Array) -> str:
-    x, y, z, w = to_quaternion(rotation)
-    return numbers(w, x, y, z)
+def _quaternion(rotation: Array) -> Array:
+    """Return w x y z of a rotation."""
+    return np.roll(to_quaternion(rotation), 1)

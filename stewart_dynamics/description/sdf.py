@@ -91,10 +91,10 @@ def upright(gravity: Array) -> Array:
 
 
 def _complete_drive(writer: _SdfWriter, drive: ET.Element, joint: Joint, positions: bool) -> None:
-    add(drive, 'drake:rotor_inertia', numbers(joint.armature))
-    add(drive, 'drake:gear_ratio', numbers(1.0))
+    add(drive, 'drake:rotor_inertia', joint.armature)
+    add(drive, 'drake:gear_ratio', 1.0)
     if positions:
-        add(drive, f'{CARRIED}:position', numbers(joint.position))
+        add(drive, f'{CARRIED}:position', joint.position)
     axis, (lower, upper) = writer.add_values(drive, 'axis', xyz=[0, 0, 1]), joint.travel
     writer.add_values(axis, 'limit', lower=lower, upper=upper, effort=joint.force_max,
                       velocity=joint.velocity_max)
@@ -112,10 +112,10 @@ def _add_tip(writer: _SdfWriter, model: ET.Element, hexapod: Hexapod, leg: LegDe
     add(fixes, 'parent_link', hexapod.platform)
     add(fixes, 'child_model', '__model__')
     add(fixes, 'child_link', leg.tip)
-    closing = add(model, 'drake:ball_constraint')
-    for key, value in (('body_A', leg.last), ('body_B', hexapod.platform),
-                       ('p_AP', numbers(leg.branch.end)), ('p_BQ', numbers(leg.platform_joint))):
-        add(closing, f'drake:ball_constraint_{key}', value)
+    writer.add_values(model, 'drake:ball_constraint', **{
+        f'drake:ball_constraint_{key}': value for key, value in (
+            ('body_A', leg.last), ('body_B', hexapod.platform),
+            ('p_AP', leg.branch.end), ('p_BQ', leg.platform_joint))})
 
 
 class _SdfWriter(XmlWriter):
@@ -124,25 +124,23 @@ class _SdfWriter(XmlWriter):
     file = 'uri'
     names = True
 
-    def add_value(self, parent: ET.Element, tag: str, value: str, key: str = '') -> None:
+    def add_value(self, parent: ET.Element, tag: str, value: Any, key: str = '') -> None:
         """Add an element with a text."""
         add(parent, tag, value)
 
     def add_values(self, parent: ET.Element, tag: str, **values: Any) -> ET.Element:
-        """Add an element with elements; a value None has none."""
+        """Add an element with elements."""
         made = add(parent, tag)
         for key, value in values.items():
             if value is not None:
-                add(made, key, value if isinstance(value, str) else numbers(value))
+                add(made, key, value)
         return made
 
     def add_pose(self, parent: ET.Element, position: Array, rotation: Array | None = None,
                  relative_to: str = '') -> None:
         """Add a pose, in the frame of the parent or another one."""
         angles = np.zeros(3) if rotation is None else to_euler(rotation)
-        pose = add(parent, 'pose', numbers(position, angles))
-        if relative_to:
-            pose.set('relative_to', relative_to)
+        add(parent, 'pose', numbers(position, angles), relative_to=relative_to or None)
 
     def add_material(self, visual: ET.Element, color: str) -> None:
         """Add a color by its numbers."""

@@ -25,7 +25,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.carried import CARRIED, carried
 from stewart_dynamics.description.hexapod import (
     Hexapod, LegDescription, massless, PASSIVE_RATE, TreeBody, UNLIMITED)
-from stewart_dynamics.description.xml_text import add, numbers, text_of, XmlWriter
+from stewart_dynamics.description.xml_text import add, text_of, XmlWriter
 from stewart_dynamics.legs.mechanism import (
     FIXED, HINGE, MechanismBody, Placement, SLIDE, UNIVERSAL)
 from stewart_dynamics.legs.tree import VisualShape
@@ -65,7 +65,7 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None,
     """
     root = ET.Element('robot')
     for color, rgba in hexapod.colors.items():
-        add(add(root, 'material', name=color), 'color', rgba=numbers(rgba))
+        add(add(root, 'material', name=color), 'color', rgba=rgba)
     tree = hexapod.tree(hexapod.base, solid, unlimited=UNLIMITED)
     base, *of_legs, platform = tree
     writer = _UrdfWriter(hexapod, root, hexapod.frame_body if solid else massless)
@@ -95,7 +95,7 @@ def _constraint(root: ET.Element, hexapod: Hexapod, leg: LegDescription) -> None
     for side, link, at in (('parent', leg.last, leg.branch.end),
                            ('child', hexapod.platform, leg.platform_joint)):
         add(closing, side, link=link)
-        add(closing, f'{side}_origin', xyz=numbers(at), rpy=numbers(np.zeros(3)))
+        add(closing, f'{side}_origin', xyz=at, rpy=np.zeros(3))
 
 
 class _UrdfWriter(XmlWriter):
@@ -113,19 +113,18 @@ class _UrdfWriter(XmlWriter):
         super().__init__(hexapod.colors)
         self._hexapod, self._root, self._frame = hexapod, root, frame
 
-    def add_value(self, parent: ET.Element, tag: str, value: str, key: str = 'value') -> None:
+    def add_value(self, parent: ET.Element, tag: str, value: Any, key: str = 'value') -> None:
         """Add an element with an attribute."""
         add(parent, tag, **{key: value})
 
     def add_values(self, parent: ET.Element, tag: str, **values: Any) -> ET.Element:
         """Add an element with attributes."""
-        return add(parent, tag, **{key: value if isinstance(value, str) else numbers(value)
-                                   for key, value in values.items()})
+        return add(parent, tag, **values)
 
     def add_pose(self, parent: ET.Element, position: Array, rotation: Array | None = None) -> None:
         """Add an origin."""
-        turn = {} if rotation is None else {'rpy': to_euler(rotation)}
-        self.add_values(parent, 'origin', xyz=position, **turn)
+        angles = None if rotation is None else to_euler(rotation)
+        add(parent, 'origin', xyz=position, rpy=angles)
 
     def add_material(self, visual: ET.Element, color: str) -> None:
         """Add a color by its name."""
@@ -149,9 +148,8 @@ class _UrdfWriter(XmlWriter):
         """Add a joint about or along an axis, x, y or z; one without actuator by default."""
         joint = self.add_joint(self._root, name, kind, parent, child,
                                *((at.position, at.rotation) if at else ()))
-        self.add_values(joint, 'axis', xyz=_AXES[axis])
-        self.add_values(joint, 'limit', lower=bounds[0], upper=bounds[1], velocity=rate,
-                        effort=effort)
+        add(joint, 'axis', xyz=_AXES[axis])
+        add(joint, 'limit', lower=bounds[0], upper=bounds[1], velocity=rate, effort=effort)
         return joint
 
     def add_platform(self, platform: TreeBody) -> None:
@@ -192,7 +190,7 @@ class _UrdfWriter(XmlWriter):
                 drive = self.add_moving(
                     leg.name, made.kind, made.parent, name, 'z', (made.lower, made.upper),
                     part.at_zero, made.velocity_max, made.force_max)
-                self.add_values(drive, 'dynamics', damping=made.damping, friction=made.friction)
+                add(drive, 'dynamics', damping=made.damping, friction=made.friction)
         if leg.branch.end.any():
             self.add_fixed(leg.tip, leg.last, leg.branch.end)
 
@@ -217,5 +215,4 @@ def _ros2_control(root: ET.Element, hexapod: Hexapod, name: str, control: Ros2Co
         for interface in ('position', 'velocity', 'effort'):
             state = add(joint, 'state_interface', name=interface)
             if interface == 'position':
-                add(state, 'param', numbers(leg.branch.home - leg.branch.zero),
-                    name='initial_value')
+                add(state, 'param', leg.branch.home - leg.branch.zero, name='initial_value')

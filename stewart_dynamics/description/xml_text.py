@@ -30,11 +30,17 @@ def numbers(*values: Any) -> str:
     return ' '.join(repr(float(each) + 0.0) for value in values for each in np.ravel(value))
 
 
-def add(parent: ET.Element, tag: str, text: str | None = None, **attributes: str) -> ET.Element:
-    """Add an element; a trailing underscore of an attribute's name is dropped."""
-    child = ET.SubElement(parent, tag, {
-        name.rstrip('_'): value for name, value in attributes.items()})
-    child.text = text
+def add(parent: ET.Element, tag: str, text: Any = None, **attributes: Any) -> ET.Element:
+    """
+    Add an element with a text and attributes, which may be numbers; None: without it.
+
+    A trailing underscore of an attribute's name is dropped.
+    """
+    shown = {name.rstrip('_'): value if isinstance(value, str) else numbers(value)
+             for name, value in {'': text, **attributes}.items() if value is not None}
+    content = shown.pop('', None)
+    child = ET.SubElement(parent, tag, shown)
+    child.text = content
     return child
 
 
@@ -60,12 +66,12 @@ class XmlWriter(ABC):
         self.colors = colors
 
     @abstractmethod
-    def add_value(self, parent: ET.Element, tag: str, value: str, key: str = 'value') -> None:
+    def add_value(self, parent: ET.Element, tag: str, value: Any, key: str = 'value') -> None:
         """Add an element with one value: its text, or an attribute ``key``."""
 
     @abstractmethod
     def add_values(self, parent: ET.Element, tag: str, **values: Any) -> ET.Element:
-        """Add an element with values, numbers or texts: elements within it, or attributes."""
+        """Add an element with values, but those that are None: its elements, or attributes."""
 
     @abstractmethod
     def add_pose(self, parent: ET.Element, position: Array, rotation: Array | None = None) -> None:
@@ -79,7 +85,7 @@ class XmlWriter(ABC):
         """Add mass, center of mass and inertia of a link."""
         inertial = add(link, 'inertial')
         self.add_pose(inertial, body.center)
-        self.add_value(inertial, 'mass', numbers(body.mass))
+        self.add_value(inertial, 'mass', body.mass)
         self.add_values(inertial, 'inertia', **dict(zip(
             INERTIA, body.inertia[np.triu_indices(3)], strict=True)))
 
@@ -87,14 +93,15 @@ class XmlWriter(ABC):
         """Add what a link looks like, and what others collide with."""
         for kind, some in (('visual', looks), ('collision', solids(looks))):
             for n, shape in enumerate(some, 1):
-                one = add(link, kind, **{'name': f'{kind}_{n}'} if self.names else {})
+                one = add(link, kind, name=f'{kind}_{n}' if self.names else None)
                 self.add_pose(one, shape.position, shape.rotation)
-                values: dict[str, Any] = {'radius': shape.radius, 'length': shape.length}
+                geometry = add(one, 'geometry')
                 if shape.kind == 'mesh':
-                    values = {self.file: shape.file, 'scale': [shape.scale] * 3}
-                elif shape.kind == 'sphere':
-                    del values['length']
-                self.add_values(add(one, 'geometry'), shape.kind, **values)
+                    self.add_values(geometry, 'mesh', **{self.file: shape.file},
+                                    scale=[shape.scale] * 3)
+                else:
+                    self.add_values(geometry, shape.kind, radius=shape.radius,
+                                    length=shape.length or None)
                 if kind == 'visual':
                     self.add_material(one, shape.color)
 
