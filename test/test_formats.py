@@ -20,7 +20,7 @@ from stewart_dynamics.legs.mechanism import HERE, Placement, UNIVERSAL, WORLD
 EXACT = 1e-12
 SINGLE = 1e-6  # USD
 NEEDS = {'xml': 'mujoco', 'usda': 'pxr'}
-# How each format counts positions, and what it needs to be complete.
+# Options of the tree that each format has.
 TREES: dict[str, dict[str, Any]] = {
     'urdf': {'solid': False, 'unlimited': UNLIMITED}, 'sdf': {'from_home': True},
     'xml': {'uris': False, 'paired': True}, 'usda': {'uris': False, 'from_home': True}}

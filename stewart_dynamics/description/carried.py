@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 
-"""Parameters that a format has no elements for, or others, as all writers add them."""
+"""Parameters that the elements of a format do not hold, or hold with other values."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Files of other tools: all formats, with their writers, and their readers by what a file has."""
+"""Formats of other tools: their writers, and their readers by the content of a file."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ class XmlWriter(ABC):
 
     @abstractmethod
     def add_pose(self, parent: ET.Element, position: Array, rotation: Array | None = None) -> None:
-        """Add a position (3,) and rotation (3, 3) of an element, which is none if not given."""
+        """Add position (3,) and rotation (3, 3) of an element, by default without a rotation."""
 
     @abstractmethod
     def add_material(self, visual: ET.Element, color: str) -> None:
@@ -90,7 +90,7 @@ class XmlWriter(ABC):
             INERTIA, body.inertia[np.triu_indices(3)], strict=True)))
 
     def add_shapes(self, link: ET.Element, looks: Sequence[VisualShape]) -> None:
-        """Add what a link looks like, and what others collide with."""
+        """Add the visual and the collision shapes of a link."""
         for kind, some in (('visual', looks), ('collision', solids(looks))):
             for n, shape in enumerate(some, 1):
                 one = add(link, kind, name=f'{kind}_{n}' if self.names else None)
