@@ -435,6 +435,9 @@ def test_a_start_outside_the_limits_is_reported(tmp_path):
     '<sdf version="1.9"><model name="m"><link name="a"/><frame name="f" attached_to="g"/>'
     '<frame name="g" attached_to="f"/><joint name="j" type="fixed"><parent>f</parent>'
     '<child>a</child></joint></model></sdf>',
+    '<sdf version="1.5"><model name="m"><include><uri>model://six</uri></include><link name="a"/>'
+    '<joint name="j" type="fixed"><parent>a</parent><child>six::base</child></joint></model>'
+    '</sdf>',
 ], ids=itertools.count())
 def test_a_file_without_a_hexapod_is_rejected_in_one_line(text, tmp_path, snapshot):
     path = tmp_path / 'file.xml'

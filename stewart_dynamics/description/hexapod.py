@@ -66,11 +66,6 @@ class LegDescription(NamedTuple):
     branch: LegBranch
 
     @property
-    def drive(self) -> LegLink:
-        """Return the link that the drive moves."""
-        return next(link for link in self.branch.links if link.joint != UNIVERSAL)
-
-    @property
     def last(self) -> str:
         """Return the name of the body at the platform."""
         return self.bodies[-1]

@@ -158,7 +158,7 @@ def _loops(root: ET.Element, hexapod: Hexapod) -> None:
         # in the pose of the file.
         add(equality, 'connect', name=leg.ball, body1=leg.last, body2=hexapod.platform,
             anchor=leg.branch.end, solref=SOLREF_LOOP, solimp=SOLIMP)
-        if leg.drive.joint != SLIDE:
+        if hexapod.kind.drive_joint != SLIDE:
             continue
         # It has no stiffness: it measures the length from joint to joint.
         length = add(tendons, 'spatial', name=leg.name, rgba='0 0 0 0')
@@ -177,7 +177,7 @@ def _actuators(root: ET.Element, hexapod: Hexapod, tree: Sequence[TreeBody]) -> 
     kind = hexapod.kind
     for quantity, tag in ((kind.position, 'pos'), (kind.rate, 'vel')):
         for leg in hexapod.legs:
-            sensed = 'tendon' if leg.drive.joint == SLIDE else 'joint'
+            sensed = 'tendon' if hexapod.kind.drive_joint == SLIDE else 'joint'
             add(sensors, f'{sensed}{tag}', name=f'{leg.name}_{quantity.name}',
                 **{sensed: leg.name})
     for leg in hexapod.legs:

@@ -52,7 +52,7 @@ def picture(hexapod: Hexapod, name: str) -> str:
     p = hexapod.parameters
     base = p.geometry.base_joints
     platform = hexapod.position + p.geometry.platform_joints @ hexapod.rotation.T
-    knees = [_knee(leg) for leg in hexapod.legs if leg.drive.joint == HINGE]
+    knees = [_knee(leg) for leg in hexapod.legs if hexapod.kind.drive_joint == HINGE]
     for at, (title, axes, toward) in zip((0.0, 0.5 * _WIDTH), _VIEWS, strict=True):
         across = np.array([knee.motion @ toward for knee in knees])
         _view(root, at, title, base[:, axes], platform[:, axes],

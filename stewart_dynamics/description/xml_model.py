@@ -147,7 +147,8 @@ class XmlModel:
         end = name
         while end not in self._links:
             if end in waiting or end not in self._attached:
-                raise self.error(f'{what}: no link {name!r}')
+                nested = ' here: nested and included models are not read' if '::' in name else ''
+                raise self.error(f'{what}: no link {name!r}{nested}')
             waiting[end] = None
             end = self._attached[end]
         self._links |= dict.fromkeys(waiting, self._links[end])
