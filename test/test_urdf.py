@@ -126,7 +126,7 @@ def test_the_loops_are_closed_in_the_singular_direction_of_a_universal_joint(off
         tip = p['geometry.base_joints'][leg] + 1.2 * x + off * (y - z)
         turn = rotation_about([0.0, 0.0, 1.0], 0.3)
         pose = Pose(tip - turn @ p['geometry.platform_joints'][leg], turn)
-        assert tree.gap(pose, tree.joints.of_sample(pose.rows.tolist())) < CLOSED
+        assert tree.gap(pose, tree.joints.positions(pose.position, pose.rotation)) < CLOSED
 
 
 def test_the_urdf_has_the_joints_of_the_closed_form_and_the_limits_of_the_parameters():

@@ -44,8 +44,9 @@ class ModelMessages:
 
     def joint_states(self, stamp: int, pose: Sequence[float]) -> bytes:
         """Return the sensor_msgs/JointState of all joints at a pose, as in a row of motion."""
-        return self._positions.write(
-            [stamp], [self._joints.of_sample(pose)]).tobytes()
+        row = np.array(pose[:ROTATION.stop])
+        return self._positions.write([stamp], self._joints.positions(
+            row[None, POSITION], row[ROTATION].reshape(1, 3, 3))).tobytes()
 
     def transform(self, stamp: int, pose: Sequence[float]) -> bytes:
         """Return the tf2_msgs/TFMessage from ``base_frame`` to ``platform_frame`` at a pose."""

@@ -102,17 +102,16 @@ class _Model:
 
     def _is_off(self, flag: str) -> bool:
         """Return whether an option of the file switches something off."""
-        bit = getattr(self._mujoco.mjtDisableBit, f'mjDSBL_{flag}', None)
-        return bit is not None and bool(self._model.opt.disableflags & int(bit))
+        bit = getattr(self._mujoco.mjtDisableBit, f'mjDSBL_{flag}')
+        return bool(self._model.opt.disableflags & int(bit))
 
     def _number(self, field: str, n: int) -> float:
-        """Return a number of the model; 0 in versions without it."""
-        values = getattr(self._model, field, None)
-        return 0.0 if values is None else float(values[n].item())
+        """Return a number of the model."""
+        return float(getattr(self._model, field)[n].item())
 
     def _grows(self, field: str, n: int) -> bool:
-        """Return whether a joint has terms with powers; False in versions without them."""
-        return bool(np.any(getattr(self._model, field, np.zeros(n + 1))[n]))
+        """Return whether a joint has terms with powers."""
+        return bool(np.any(getattr(self._model, field)[n]))
 
     def _take_options(self) -> None:
         """Take gravity as it acts, and name forces that act on all bodies."""

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -480,15 +481,11 @@ class Crank(LegKind):
         return tree.branches(parameters, crank_bodies(parameters), position, rotation, mounts,
                              size)
 
-    def tree_positions(self, parameters: Parameters, mounts: Array, position: Array,
-                       rotation: Array, home: tuple[Array, Array]) -> Array:
-        """Return angles of the cranks and of the universal joints (..., 6, 3)."""
-        return tree.tree_positions(parameters, mounts, position, rotation, home)
-
-    def tree_sampler(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
-                     ) -> Callable[[Sequence[float]], list[float]]:
-        """Return the function for one pose."""
-        return tree.tree_sampler(parameters, mounts, home)
+    def tree_joints(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
+                    ) -> Callable[[Array, Array], Array]:
+        """Return angles of the cranks and of the universal joints."""
+        legs = tree.crank_legs(parameters)
+        return partial(tree.tree_positions, legs, tree.mounts_on_cranks(legs, home, mounts))
 
     def drive_of(self, steps: Sequence[LegJoint]) -> int | None:
         """Return 0 if the first joint turns a crank."""

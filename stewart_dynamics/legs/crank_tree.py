@@ -10,9 +10,9 @@ motor. The rod hangs on its end by a universal joint; its z is along the rod.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import math
-from math import atan2, cos, hypot, sin, sqrt
+from math import cos, sin
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
@@ -86,7 +86,7 @@ def _axes(legs: CrankLegs, n: int, angle: float) -> Array:
     return np.column_stack([e, np.cross(legs.axis[n], e), legs.axis[n]])
 
 
-def _mounts_on_cranks(legs: CrankLegs, home: tuple[Array, Array], mounts: Array) -> Array:
+def mounts_on_cranks(legs: CrankLegs, home: tuple[Array, Array], mounts: Array) -> Array:
     """
     Return rotations (6, 3, 3) from the axes of the mounts to those of the cranks.
 
@@ -113,7 +113,7 @@ def branches(p: Parameters, bodies: tuple[Array, Array], position: Array, rotati
     """
     legs = crank_legs(p)
     q = crank_angles(legs, position, rotation)[0]
-    on_cranks = _mounts_on_cranks(legs, (position, rotation), mounts)
+    on_cranks = mounts_on_cranks(legs, (position, rotation), mounts)
     masses, rod_centers, rod_inertias = (
         p['legs.rod.mass'], *(rod_value(p, name) for name in ('center_of_mass', 'inertia')))
     found = []
@@ -155,48 +155,15 @@ def rod_value(p: Parameters, name: str) -> Array:
     return default
 
 
-def tree_positions(p: Parameters, mounts: Array, position: Array, rotation: Array,
-                   home: tuple[Array, Array]) -> Array:
-    """Return the angle of each crank, and two of each universal joint (..., 6, 3) [rad]."""
-    legs = crank_legs(p)
-    on_cranks = _mounts_on_cranks(legs, home, mounts)
+def tree_positions(legs: CrankLegs, on_cranks: Array, position: Array, rotation: Array) -> Array:
+    """
+    Return the angle of each crank, and two of each universal joint (..., 6, 3) [rad].
+
+    on_cranks: see ``mounts_on_cranks``.
+    """
     q, rods = crank_angles(legs, position, rotation)
     x, y, z = np.moveaxis(np.einsum('iba,...ib->...ia', on_cranks, rods), -1, 0).copy()
     return np.stack([q, np.arctan2(-y, z), np.arctan2(x, np.hypot(y, z))], axis=-1)
-
-
-def tree_sampler(p: Parameters, mounts: Array, home: tuple[Array, Array],
-                 ) -> Callable[[Sequence[float]], list[float]]:
-    """Return the function that computes the same for one pose."""
-    numbers = crank_legs(p)
-    on_cranks = _mounts_on_cranks(numbers, home, mounts).reshape(6, 9)
-    legs = [tuple(np.concatenate([np.ravel(each[n]) for each in (*numbers, on_cranks)]).tolist())
-            for n in range(6)]
-
-    def of_sample(pose: Sequence[float]) -> list[float]:
-        tx, ty, tz, r00, r01, r02, r10, r11, r12, r20, r21, r22 = pose[:12]
-        found: list[float] = []
-        for (cx, cy, cz, zx, zy, zz, nx, ny, nz, ux, uy, uz, crank, rod, branch, middle, px, py,
-             pz, m00, m01, m02, m10, m11, m12, m20, m21, m22) in legs:
-            lx = tx - cx + r00 * px + r01 * py + r02 * pz
-            ly = ty - cy + r10 * px + r11 * py + r12 * pz
-            lz = tz - cz + r20 * px + r21 * py + r22 * pz
-            x, y = lx * zx + ly * zy + lz * zz, lx * nx + ly * ny + lz * nz
-            w = lx * ux + ly * uy + lz * uz
-            square = x * x + y * y
-            g = (square + w * w + crank * crank - rod * rod) / (2.0 * crank)
-            h = branch * sqrt(max(square - g * g, 0.0))
-            q = atan2(y * g - x * h, x * g + y * h)
-            q += _TURN * round((middle - q) / _TURN)
-            cosine, sine = cos(q), sin(q)
-            e, n = x * cosine + y * sine - crank, y * cosine - x * sine
-            along_x = m00 * e + m10 * n + m20 * w
-            along_y = m01 * e + m11 * n + m21 * w
-            along_z = m02 * e + m12 * n + m22 * w
-            found += q, atan2(-along_y, along_z), atan2(along_x, hypot(along_y, along_z))
-        return found
-
-    return of_sample
 
 
 def _rod_at(steps: Sequence[LegJoint]) -> int:

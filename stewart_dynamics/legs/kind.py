@@ -506,18 +506,14 @@ class LegKind(ABC):
         """
 
     @abstractmethod
-    def tree_positions(self, parameters: Parameters, mounts: Array, position: Array,
-                       rotation: Array, home: tuple[Array, Array]) -> Array:
+    def tree_joints(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
+                    ) -> Callable[[Array, Array], Array]:
         """
-        Return the positions of the joints of the legs in poses (..., 6, 3) [m, rad].
+        Return the function that gives the positions of the joints of legs (..., 6, 3) [m, rad].
 
-        home: position (3,) and rotation (3, 3) where the angles of universal joints are zero.
+        It takes poses: position (..., 3) and rotation (..., 3, 3).
+        home: the pose where the angles of universal joints are zero.
         """
-
-    @abstractmethod
-    def tree_sampler(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
-                     ) -> Callable[[Sequence[float]], list[float]]:
-        """Return a function that gives the same (18,), fast, for one pose as a row (12,)."""
 
     @abstractmethod
     def drive_of(self, steps: Sequence[LegJoint]) -> int | None:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
@@ -279,15 +280,10 @@ class Telescopic(LegKind):
         """Return cylinders and pistons."""
         return tree.branches(parameters, position, rotation, mounts, size)
 
-    def tree_positions(self, parameters: Parameters, mounts: Array, position: Array,
-                       rotation: Array, home: tuple[Array, Array]) -> Array:
-        """Return angles of the universal joints and positions of the slides (..., 6, 3)."""
-        return tree.tree_positions(parameters, mounts, position, rotation)
-
-    def tree_sampler(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
-                     ) -> Callable[[Sequence[float]], list[float]]:
-        """Return the function for one pose."""
-        return tree.tree_sampler(parameters, mounts)
+    def tree_joints(self, parameters: Parameters, mounts: Array, home: tuple[Array, Array],
+                    ) -> Callable[[Array, Array], Array]:
+        """Return angles of the universal joints and positions of the slides."""
+        return partial(tree.tree_positions, parameters, mounts)
 
     def drive_of(self, steps: Sequence[LegJoint]) -> int | None:
         """Return which joint slides."""

@@ -5,9 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import math
-from math import atan2, hypot
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -76,30 +75,6 @@ def tree_positions(p: Parameters, mounts: Array, position: Array, rotation: Arra
     across = np.hypot(y, z)
     return np.stack([np.arctan2(-y, z), np.arctan2(x, across),
                      np.hypot(x, across) - p.geometry.zero_length], axis=-1)
-
-
-def tree_sampler(p: Parameters, mounts: Array) -> Callable[[Sequence[float]], list[float]]:
-    """Return the function that computes the same for one pose."""
-    legs = [(*base, *platform, *mount, zero) for base, platform, mount, zero in zip(
-        p.geometry.base_joints.tolist(), p.geometry.platform_joints.tolist(),
-        mounts.reshape(6, 9).tolist(), p.geometry.zero_length.tolist(), strict=True)]
-
-    def of_sample(pose: Sequence[float]) -> list[float]:
-        x, y, z, r00, r01, r02, r10, r11, r12, r20, r21, r22 = pose[:12]
-        found: list[float] = []
-        for (bx, by, bz, px, py, pz, m00, m01, m02, m10, m11, m12, m20, m21, m22, zero) in legs:
-            lx = x - bx + r00 * px + r01 * py + r02 * pz
-            ly = y - by + r10 * px + r11 * py + r12 * pz
-            lz = z - bz + r20 * px + r21 * py + r22 * pz
-            along_x = m00 * lx + m10 * ly + m20 * lz
-            along_y = m01 * lx + m11 * ly + m21 * lz
-            along_z = m02 * lx + m12 * ly + m22 * lz
-            across = hypot(along_y, along_z)
-            found += (atan2(-along_y, along_z), atan2(along_x, across),
-                      hypot(along_x, across) - zero)
-        return found
-
-    return of_sample
 
 
 def drive_of(steps: Sequence[LegJoint]) -> int | None:

@@ -27,7 +27,6 @@ The second angle is computed with the first as it is, so that the loops are clos
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +35,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.legs import tree
-from stewart_dynamics.mechanics.frames.rotation import euler_of, to_euler
+from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import choose_branch, home_of, homes
 from stewart_dynamics.parameters.table import Parameters
 
@@ -67,9 +66,8 @@ class TreeJoints:
         choose_branch(parameters)
         self.mounts = mounts(parameters)
         positions, rotations = homes(parameters)
-        self._parameters, self._kind = parameters, parameters.leg_kind
-        self._home = positions[0], rotations[0]
-        self._of_legs = self._kind.tree_sampler(parameters, self.mounts, self._home)
+        self._of_legs = parameters.leg_kind.tree_joints(
+            parameters, self.mounts, (positions[0], rotations[0]))
 
     def positions(self, position: ArrayLike, rotation: ArrayLike) -> Array:
         """
@@ -79,20 +77,11 @@ class TreeJoints:
         rotation (..., 3, 3): platform axes to base axes.
         """
         at, r = np.asarray(position, dtype=float), np.asarray(rotation, dtype=float)
-        of_legs = self._kind.tree_positions(self._parameters, self.mounts, at, r, self._home)
+        of_legs = self._of_legs(at, r)
         shape = of_legs.shape[:-2]
         return np.concatenate([
             np.broadcast_to(at, (*shape, 3)), np.broadcast_to(to_euler(r)[..., ::-1], (*shape, 3)),
             of_legs.reshape(*shape, 18)], axis=-1)
-
-    def of_sample(self, pose: Sequence[float]) -> list[float]:
-        """
-        Return the same at one pose (24,) [m, rad], much faster.
-
-        pose: position and rotation, row by row (12,); further numbers, as of a motion, are
-            ignored.
-        """
-        return [*pose[:3], *reversed(euler_of(pose[3:12])), *self._of_legs(pose)]
 
 
 def joint_names(parameters: Parameters) -> tuple[str, ...]:
