@@ -80,7 +80,7 @@ class _SdfModel(XmlModel):
         self._placements |= dict.fromkeys(('', _MODEL), self.pose(model))
         self._axes_in_model = version < _JOINT_AXES
         # Since 1.8 joints may end at frames, of links, other frames, joints or the model.
-        self._attached = {each.get('name', ''): each.get('attached_to', _MODEL)
+        self._attached = {each.get('name', ''): each.get('attached_to') or _MODEL
                           for each in model.findall('frame')}
         self._attached |= {each.get('name', ''): each.findtext('child', '').strip()
                            for each in model.findall('joint')}

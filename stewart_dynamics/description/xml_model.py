@@ -118,7 +118,7 @@ class XmlModel:
             if turn is not None and given.get('rpy') is not None:
                 raise self.error(f'{what}: must have rpy or {_QUATERNION}, not both')
             return self._placement(self.numbers(given.get('xyz'), 3, what), self.numbers(
-                given.get('rpy') or turn, 3 if turn is None else 4, what), what)
+                turn or given.get('rpy'), 3 if turn is None else 4, what), what)
         given = element.find('pose')
         if given is None or not (given.text or '').strip():
             return HERE

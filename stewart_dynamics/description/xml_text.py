@@ -36,12 +36,14 @@ def add(parent: ET.Element, tag: str, text: Any = None, **attributes: Any) -> ET
 
     A trailing underscore of an attribute's name is dropped.
     """
-    shown = {name.rstrip('_'): value if isinstance(value, str) else numbers(value)
-             for name, value in {'': text, **attributes}.items() if value is not None}
-    content = shown.pop('', None)
-    child = ET.SubElement(parent, tag, shown)
-    child.text = content
+    child = ET.SubElement(parent, tag, {
+        name.rstrip('_'): _text(value) for name, value in attributes.items() if value is not None})
+    child.text = None if text is None else _text(text)
     return child
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else numbers(value)
 
 
 def text_of(root: ET.Element, comment: str) -> str:
