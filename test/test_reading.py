@@ -293,7 +293,7 @@ def test_the_model_of_a_world_with_most_joints_is_read(tmp_path):
 
 @pytest.mark.parametrize('mass', ['', '<mass>2</mass>'])
 def test_inertia_that_engines_compute_from_shapes_is_named(mass, tmp_path, snapshot):
-    """SDFormat since 1.11; without the attribute a missing mass is 1 kg."""
+    """As in SDFormat since 1.11; without the attribute a missing mass is 1 kg."""
     found = read_hexapod(written(PLATFORM, 'sdf', tmp_path, lambda text: re.sub(
         '(<link name="leg_2_piston">.*?)<inertial>.*?</inertial>',
         rf'\g<1><inertial auto="true">{mass}</inertial>', foreign(text), flags=re.DOTALL)))
