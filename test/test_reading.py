@@ -300,6 +300,10 @@ def test_inertia_that_engines_compute_from_shapes_is_named(mass, tmp_path, snaps
     snapshot('\n'.join(each for each in found.remarks if 'leg_2' in each))
     assert found.parameters['legs.piston.mass'][1] == (2.0 if mass else 0.0)
     assert found.parameters['legs.piston.inertia'][1] == 0.0
+    with snapshot.raises(StewartError):
+        read_hexapod(written(PLATFORM, 'sdf', tmp_path, lambda text: re.sub(
+            '(<link name="platform">.*?)<inertial>.*?</inertial>',
+            r'\1<inertial auto="true"><mass>250</mass></inertial>', text, flags=re.DOTALL)))
 
 
 @pytest.mark.parametrize('kind', WRITERS)

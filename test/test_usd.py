@@ -215,7 +215,7 @@ def test_a_mass_without_its_schema_has_no_inertia(tmp_path: Path) -> None:
             prim.RemoveProperty(f'physics:{name}')
         prim.RemoveAPI(UsdPhysics.MassAPI)
     stage.Export(str(tmp_path / 'hexapod.usda'))
-    with pytest.raises(StewartError, match='platform.inertia: .* must be positive definite'):
+    with pytest.raises(StewartError, match='platform: no inertia: .*; --geometry-only'):
         read_hexapod(tmp_path / 'hexapod.usda')
 
 

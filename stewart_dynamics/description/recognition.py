@@ -211,9 +211,11 @@ def _missing_mass(found: Topology, mass: float) -> str:
 def _platform(found: Topology, remarks: list[str], warnings: list[str]) -> dict[str, Any]:
     heavy = [part for part in found.platform_parts if part.mass]
     body = joined(heavy, found.platform.placement)
-    if not body.mass:
-        raise DescriptionError(f'{found.platform.name}: the platform has no mass; --geometry-only '
-                               'reads the geometry without masses')
+    if not body.mass or not body.inertia.any():
+        lacking = (f'{found.platform.name}: the platform has no '
+                   f'{"inertia" if body.mass else "mass"}')
+        why = next((part.note for part in heavy if part.note), lacking)
+        raise DescriptionError(f'{why}; --geometry-only reads the geometry without masses')
     if missing := _missing_mass(found, body.mass):
         warnings.append(missing)
     if len(heavy) > 1:
