@@ -5,6 +5,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from cases import few
 import numpy as np
 from numpy.testing import assert_allclose
@@ -286,70 +289,80 @@ def test_outliers_do_not_hide_one_another(seed: int) -> None:
     assert [each.pose for each in found.outliers] == outlying.tolist()
 
 
-@pytest.mark.parametrize(('what', 'words'), [
-    ('positions in mm', 'positions are in mm, not in m: --mm-positions reads them so'),
-    ('legs in mm', 'leg positions are in mm, not in m: --mm-legs reads them so'),
-    ('all in mm', 'positions and leg positions are in mm, not in m: --mm reads them so'),
-    ('swapped', 'leg_2 and leg_5 are swapped'),
-    ('another order', 'the legs are in another order: leg_6, leg_1'),
-    ('degrees', 'the angles are in degrees, not in radians: --degrees'),
-    ('all in mm and degrees', 'positions and leg positions are in mm, not in m: --mm reads '
-     'them so; the angles are in degrees, not in radians: --degrees'),
-    ('read as mm and degrees', 'positions and leg positions are in m, not in mm: without --mm '
-     'they are read so; the angles are in radians, not in degrees: without --degrees'),
-    ('outliers', '20 of 40 poses do not fit the geometry that fits all others'),
-    ('inverse', 'the inverse is needed'), ('transposed', 'the rotations are those of the base'),
-    ('sign', 'leg positions have the opposite sign'),
-    ('quaternion', 'quaternions have w first'),
-    ('whole lengths', 'the leg positions are whole lengths between the joints'),
-    ('home', 'are the leg positions relative to home'),
-    ('home of one leg', 'geometry.zero_length of leg_3 would become 1.2'),
-    ('frames', 'of other frames: --frames unknown'),
-    ('shuffled', 'lengths and poses must be of the same instants')])
-def test_likely_mistakes_are_named(what: str, words: str) -> None:
+def scaled(poses: Pose, factor: float) -> Pose:
+    return Pose(factor * poses.position, poses.rotation)
+
+
+def turned(poses: Pose, angles: np.ndarray) -> Pose:
+    return Pose(poses.position, from_euler(angles))
+
+
+def shifted(values: np.ndarray, size: float) -> np.ndarray:
+    return values + np.random.default_rng(1).normal(0.0, size, (40, 3)) * (
+        np.arange(40) % 2)[:, None]
+
+
+COPIES = [*range(40), *range(10)]
+
+
+@pytest.mark.parametrize(('change', 'words'), [
+    (lambda q, seen, _: {'poses': scaled(seen, 1e3)},
+     'positions are in mm, not in m: --mm-positions reads them so'),
+    (lambda q, *_: {'lengths': 1e3 * q},
+     'leg positions are in mm, not in m: --mm-legs reads them so'),
+    (lambda q, seen, _: {'lengths': 1e3 * q, 'poses': scaled(seen, 1e3)},
+     'positions and leg positions are in mm, not in m: --mm reads them so'),
+    (lambda q, *_: {'lengths': q[:, [0, 4, 2, 3, 1, 5]]}, 'leg_2 and leg_5 are swapped'),
+    (lambda q, *_: {'lengths': q[:, [1, 2, 3, 4, 5, 0]]},
+     'the legs are in another order: leg_6, leg_1'),
+    (lambda q, seen, angles: {
+        'poses': turned(seen, np.degrees(angles)), 'angles': np.degrees(angles)},
+     'the angles are in degrees, not in radians: --degrees'),
+    (lambda q, seen, angles: {
+        'lengths': 1e3 * q, 'poses': turned(scaled(seen, 1e3), np.degrees(angles)),
+        'angles': np.degrees(angles)},
+     'positions and leg positions are in mm, not in m: --mm reads them so; the angles are in '
+     'degrees, not in radians: --degrees'),
+    (lambda q, seen, angles: {
+        'lengths': 1e-3 * q, 'poses': turned(scaled(seen, 1e-3), np.radians(angles)),
+        'angles': angles, 'degrees': True, 'millimeters': Millimeters(True, True)},
+     'positions and leg positions are in m, not in mm: without --mm they are read so; the angles '
+     'are in radians, not in degrees: without --degrees'),
+    (lambda q, seen, _: {'poses': Pose(shifted(seen.position, 0.05), seen.rotation)},
+     '20 of 40 poses do not fit the geometry that fits all others'),
+    (lambda q, seen, _: {'poses': inverse(seen)}, 'the inverse is needed'),
+    (lambda q, seen, _: {'poses': Pose(seen.position, np.swapaxes(seen.rotation, 1, 2))},
+     'the rotations are those of the base'),
+    (lambda q, *_: {'lengths': -q}, 'leg positions have the opposite sign'),
+    (lambda q, seen, _: {'poses': Pose.from_quaternion(
+        seen.position, np.roll(seen.quaternion, 1, axis=1))}, 'quaternions have w first'),
+    (lambda q, *_: {'lengths': q + 0.95},
+     'the leg positions are whole lengths between the joints'),
+    (lambda q, *_: {'lengths': q - 0.2776}, 'are the leg positions relative to home'),
+    (lambda q, *_: {'lengths': q - 0.2776 * np.eye(6)[2]},
+     'geometry.zero_length of leg_3 would become 1.2'),
+    (lambda q, seen, _: {'poses': Equations(LEGS, q, seen).as_measured(seen, FRAMES)},
+     'of other frames: --frames unknown'),
+    (lambda q, seen, _: {'poses': Pose(
+        np.random.default_rng(1).permutation(seen.position), seen.rotation)},
+     'lengths and poses must be of the same instants'),
+    (lambda q, seen, _: {'lengths': q[COPIES], 'poses': seen[COPIES]},
+     '10 of 50 measurements repeat an earlier one')])
+def test_possible_errors_are_named(change: Callable[..., dict[str, Any]], words: str) -> None:
     rng = np.random.default_rng(7)
-    poses = random_poses(rng, 40)
-    angles = rng.uniform(-0.3, 0.3, (40, 3))
-    poses = Pose(poses.position, from_euler(angles))
-    lengths, seen = measured(rng, true_values(rng), poses, Noise(2e-6, 1e-5, 1e-5))
-    position, rotation, given = seen.position, seen.rotation, None
-    if what in ('positions in mm', 'all in mm', 'all in mm and degrees'):
-        position = 1e3 * position
-    if what in ('legs in mm', 'all in mm', 'all in mm and degrees'):
-        lengths = 1e3 * lengths
-    if what == 'read as mm and degrees':
-        position, lengths, given = 1e-3 * position, 1e-3 * lengths, angles
-        rotation = from_euler(np.radians(angles))
-    if what == 'outliers':
-        position = position + rng.normal(0.0, 0.05, (40, 3)) * (np.arange(40) % 2)[:, None]
-    if what == 'swapped':
-        lengths = lengths[:, [0, 4, 2, 3, 1, 5]]
-    if what == 'another order':
-        lengths = lengths[:, [1, 2, 3, 4, 5, 0]]
-    if what in ('degrees', 'all in mm and degrees'):
-        given = np.degrees(angles)
-        rotation = from_euler(given)
-    if what == 'inverse':
-        position, rotation = inverse(seen).position, inverse(seen).rotation
-    if what == 'transposed':
-        rotation = np.swapaxes(rotation, 1, 2)
-    if what == 'sign':
-        lengths = -lengths
-    if what == 'quaternion':
-        rotation = Pose.from_quaternion(position, np.roll(seen.quaternion, 1, axis=1)).rotation
-    if what == 'whole lengths':
-        lengths = lengths + 0.95
-    if what.startswith('home'):
-        lengths = lengths - (0.2776 * np.eye(6)[2] if what.endswith('leg') else 0.2776)
-    if what == 'shuffled':
-        position = rng.permutation(position)
-    pose = Pose(position, rotation)
-    if what == 'frames':
-        pose = Equations(LEGS, lengths, pose).as_measured(pose, FRAMES)
+    poses, angles = random_poses(rng, 40), rng.uniform(-0.3, 0.3, (40, 3))
+    lengths, seen = measured(
+        rng, true_values(rng), turned(poses, angles), Noise(2e-6, 1e-5, 1e-5))
     with pytest.raises(StewartError) as caught:
-        calibrate(HEXAPOD, lengths, pose, angles=given, degrees=what.startswith('read'),
-                  millimeters=Millimeters(*2 * [what.startswith('read')]))
+        calibrate(HEXAPOD, **{
+            'lengths': lengths, 'poses': seen, **change(lengths, seen, angles)})
     assert words in str(caught.value) and 'nothing is calibrated' in str(caught.value)
+
+
+def test_a_measurement_that_was_copied_once_is_no_error() -> None:
+    rng = np.random.default_rng(7)
+    lengths, seen = measured(rng, true_values(rng), random_poses(rng, 40), Noise(2e-6, 1e-5, 1e-5))
+    assert not calibrate(HEXAPOD, lengths[COPIES[:41]], seen[COPIES[:41]]).likely
 
 
 @pytest.mark.parametrize('noise', [0.0, 1e-4])

@@ -52,3 +52,6 @@ def test_hypotheses_that_explain_data_alike_are_the_likeliest() -> None:
     assert likeliest(tried, 0.1, alike=2.0) == [(0.02, 'unit'), (0.03, 'order')]
     assert likeliest(tried, 0.1, exact=0.6) == tried[:3]
     assert likeliest(tried, 0.01) == likeliest([], 1.0) == []
+    evidence = [(-2e3, 'play'), (-1e3, 'drift'), (-1999.0, 'pose'), (0.0, 'scale')]
+    assert likeliest(evidence, -7.0, 3.0, logarithms=True) == [evidence[0], evidence[2]]
+    assert likeliest(evidence[3:], -7.0, 3.0, logarithms=True) == []

@@ -14,14 +14,13 @@ estimated from five zeros. The likelihood ratio is
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.legs.calibrated import CalibratedLegs, ZeroStep
 from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
-from stewart_dynamics.possible_errors.hypothesis import PossibleError
+from stewart_dynamics.possible_errors.hypothesis import likeliest, PossibleError
 
 # Logarithm of the likelihood ratio from which a step is named, and up to which others are named
 # beside it.
@@ -31,14 +30,6 @@ _EXACT = 1e-9  # smallest scale [rad]
 _MOST = 1e9  # larger ratios are all the same to a reader
 STEP, TURN = 'step', 'turn'
 """Keywords of a step with which a drive works, and of one with which it does not."""
-
-
-class _Likeliest(NamedTuple):
-    leg: int
-    evidence: float
-    size: float  # of the step, with its sign
-    step: ZeroStep
-    text: str
 
 
 def assembly_errors(legs: CalibratedLegs, values: Array, errors: Array, held: Flags,
@@ -54,41 +45,29 @@ def assembly_errors(legs: CalibratedLegs, values: Array, errors: Array, held: Fl
     known = np.where(np.isfinite(errors[legs.zero]), errors[legs.zero], 0.0)
     found: list[tuple[float, PossibleError]] = []
     rest, open_legs = left.copy(), [*range(6)]
-    while open_legs:
-        best = max((_likeliest(legs, leg, left, rest, known) for leg in open_legs),
-                   key=lambda each: each.evidence)
-        if best.evidence < NAMED:
-            break
-        rest[best.leg] = left[best.leg] - best.size
-        open_legs.remove(best.leg)
-        found.append((best.evidence, PossibleError(
-            STEP if best.step.mounted else TURN, best.text)))
-    return tuple(each for _, each in sorted(found, key=lambda each: -each[0]))
+    while alike := sorted(likeliest(
+            ((_misfit(left[leg], np.delete(rest, leg), known[leg], step), (leg, step))
+             for leg in open_legs for step in legs.zero_steps),
+            -NAMED, ALIKE, logarithms=True), key=lambda each: each[0]):
+        misfit, (leg, best) = alike[0]
+        rest[leg] = left[leg] - math.copysign(best.size, left[leg])
+        open_legs.remove(leg)
+        steps = _words([step for _, (of, step) in alike if of == leg])
+        way = 'far' if left[leg] > 0.0 else 'far back'
+        found.append((misfit, PossibleError(STEP if best.mounted else TURN, (
+            f'the {legs.zero_part} of {legs.parameters.joints[leg]} sits {steps} too {way}: its '
+            f'zero is {math.degrees(left[leg]):.3g} deg from that of the file, '
+            f'{times_as_likely(-misfit)} as likely by that as by an error like those of the '
+            'others'))))
+    return tuple(each for _, each in sorted(found, key=lambda each: each[0]))
 
 
-def _likeliest(legs: CalibratedLegs, leg: int, zeros: Array, rest: Array, errors: Array,
-               ) -> _Likeliest:
-    """Return the step that is likeliest for a leg."""
-    others = np.delete(rest, leg)
-    scale = math.hypot(BY_MEDIAN * float(np.median(np.abs(others))), errors[leg]) + _EXACT
-
-    def likelihood(size: float) -> float:
-        return -0.5 * (_FREEDOM + 1.0) * math.log1p(
-            (zeros[leg] - size) ** 2 / (_FREEDOM * scale ** 2))
-
-    sign = math.copysign(1.0, zeros[leg])
-    tried = sorted(((likelihood(sign * step.size), step) for step in legs.zero_steps),
-                   key=lambda each: -each[0])
-    best, step = tried[0]
-    evidence = best - likelihood(0.0)
-    alike = [each for value, each in tried if value > best - ALIKE]
-    joint = legs.parameters.joints[leg]
-    way = 'far' if sign > 0.0 else 'far back'
-    text = (f'the {legs.zero_part} of {joint} sits {_words(alike)} too {way}: its zero is '
-            f'{math.degrees(zeros[leg]):.3g} deg from that of the file, '
-            f'{times_as_likely(evidence)} as likely by that as by an error like those of the '
-            'others')
-    return _Likeliest(leg, evidence, sign * step.size, step, text)
+def _misfit(zero: float, others: Array, error: float, step: ZeroStep) -> float:
+    """Return the logarithm of the likelihood of no step by that of a step."""
+    scale = math.hypot(BY_MEDIAN * float(np.median(np.abs(others))), error) + _EXACT
+    without, of_step = (math.log1p((zero - size) ** 2 / (_FREEDOM * scale ** 2))
+                        for size in (0.0, math.copysign(step.size, zero)))
+    return 0.5 * (_FREEDOM + 1.0) * (of_step - without)
 
 
 def times_as_likely(evidence: float) -> str:

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.calibration.assembly_errors import assembly_errors, TURN
 from stewart_dynamics.calibration.calibration_mistakes import (
-    Measured, mistakes_of_input, mistakes_of_result, not_identified)
+    CalibratedFit, Measured, mistakes_of_input, not_identified, RESULT_ERRORS)
 from stewart_dynamics.calibration.equations import (
     chosen, DEVICE, Equations, Frames, GEOMETRY, GUIDED, held_by_groups, SAME, values_of,
     with_geometry)
@@ -38,7 +38,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.least_squares import Identifiability, LARGEST_SHARE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters, UNIVERSAL
-from stewart_dynamics.possible_errors.hypothesis import PossibleError
+from stewart_dynamics.possible_errors.hypothesis import find_errors, PossibleError
 from stewart_dynamics.reporting.estimates import (
     FIXED, HOLD_OUT, IDENTIFIED, justified, states_of)
 
@@ -211,7 +211,8 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
                          directions=what.directions[GEOMETRY])
     states = tuple(FIXED if each else state for each, state in zip(
         held, states_of(what), strict=True))
-    refuse(mistakes_of_result(legs, found.values, found.lin.residuals, size))
+    refuse(find_errors(RESULT_ERRORS, CalibratedFit(
+        legs, found.values, found.lin.residuals, size)))
     assembly = assembly_errors(legs, found.values[GEOMETRY], np.sqrt(
         np.maximum(np.diag(found.covariance)[GEOMETRY], 0.0)), held)
     refuse(each for each in assembly if each.what == TURN)

@@ -31,7 +31,8 @@ from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
 from stewart_dynamics.parameters.table import AUTO, Parameters
-from stewart_dynamics.possible_errors.hypothesis import likeliest, PossibleError
+from stewart_dynamics.possible_errors.hypothesis import (
+    find_errors, Hypothesis, likeliest, PossibleError, Table)
 from stewart_dynamics.possible_errors.transforms import swapped_pairs
 
 # An error is likely if the misfit without it is smaller than this part.
@@ -48,6 +49,8 @@ _ALIKE, _EXACT = 2.0, 1e-3
 # Largest scale of positions that is tried and how near, logarithms; a misfit above all others.
 _LARGEST_SCALE, _SCALE_STEP, _WORST = math.log(2.0), 1e-3, 1e3
 DEVICE_SCALE, LEG_SCALE = 'device', 'scale'
+# Standard errors are 5 % too small with this share of copies.
+_COPIES = 0.1
 # Fewer poses say nothing about errors that change the positions of a leg alike.
 _FEWEST = 4
 # A joint that moves by a larger part of the characteristic length is not of this hexapod.
@@ -78,8 +81,31 @@ class Measured(NamedTuple):
         whole = max(map(_spread, motions))
         return _spread(off) / whole if whole > 0.0 else math.inf
 
+    @property
+    def number(self) -> int:
+        """Return the number of measurements."""
+        return len(self.equations.positions)
+
+    @property
+    def repeated(self) -> int:
+        """Return the number of measurements that repeat an earlier one, number for number."""
+        pose = self.equations.pose
+        return self.number - len(np.unique(np.column_stack([
+            self.equations.positions, pose.position, pose.rotation.reshape(-1, 9)]), axis=0))
+
+
+_REPEATED: Table[Measured] = Hypothesis('repeated', lambda m: m.repeated - _COPIES * m.number, (
+    '{repeated} of {number} measurements repeat an earlier one, number for number: copies are not '
+    'independent, and standard errors come out too small: remove them'))
+
 
 def mistakes_of_input(measured: Measured) -> Iterator[PossibleError]:
+    """Yield the likeliest error in positions, poses or their angles, if one is likely; copies."""
+    yield from _likeliest_transform(measured)
+    yield from find_errors(_REPEATED, measured)
+
+
+def _likeliest_transform(measured: Measured) -> Iterator[PossibleError]:
     """Yield the likeliest error in positions, poses or their angles, if one is likely."""
     equations = measured.equations
     if len(equations.positions) < _FEWEST or not _moved(equations):
@@ -188,23 +214,25 @@ def _on_other_side(measured: Measured) -> Iterator[PossibleError]:
             + ('which is not given' if side == AUTO else f'{side}, is wrong'))
 
 
-def mistakes_of_result(legs: CalibratedLegs, values: Array, residuals: Array, size: float,
-                       ) -> Iterator[PossibleError]:
-    """Yield possible errors that show in calibrated values and their residuals (N, 6)."""
-    parameters = legs.parameters
-    left = float(np.sqrt(np.mean(residuals ** 2)))
-    if left > _UNEXPLAINED * size:
-        yield PossibleError('misfit', f'no geometry explains the poses: residuals of {_mm(left)} '
-                            'mm remain; lengths and poses must be of the same instants')
-    start, joints = values_of(legs), parameters.joints
-    moved = np.linalg.norm((values - start)[:PLATFORM.stop].reshape(12, 3), axis=1)
-    if moved.max() > _FARTHEST * size:
-        worst = int(np.argmax(moved))
-        where = 'base' if worst < BASE.stop // 3 else 'platform'
-        yield PossibleError('far', f'the {where} joint of {joints[worst % 6]} would move by '
-                            f'{_mm(moved[worst])} mm: the poses are not those of this hexapod')
-    for what, text in legs.mistakes_of(values, size):
-        yield PossibleError(what, text)
+class CalibratedFit:
+    """Calibrated values (n,) and their residuals (N, 6) [m], for a hexapod of a size [m]."""
+
+    def __init__(self, legs: CalibratedLegs, values: Array, residuals: Array, size: float) -> None:
+        self.legs, self.values, self.size = legs, values, size
+        self.left = 1e3 * float(np.sqrt(np.mean(residuals ** 2)))  # [mm]
+        self.moved = 1e3 * np.linalg.norm(
+            (values - values_of(legs))[:PLATFORM.stop].reshape(12, 3), axis=1)  # [mm]
+        self.joint = [f'{body} joint of {leg}' for body in ('base', 'platform')
+                      for leg in legs.parameters.joints]
+
+
+RESULT_ERRORS: Table[CalibratedFit] = (
+    Hypothesis('misfit', lambda c: c.left - 1e3 * _UNEXPLAINED * c.size, (
+        'no geometry explains the poses: residuals of {left:.3g} mm remain; lengths and poses '
+        'must be of the same instants')),
+    Hypothesis('far', lambda c: c.moved - 1e3 * _FARTHEST * c.size, (
+        'the {joint} would move by {moved:.3g} mm: the poses are not those of this hexapod')),
+    lambda c: c.legs.possible_errors(c.values, c.size))
 
 
 def _name_of(equations: Equations) -> str:
@@ -406,7 +434,3 @@ def not_identified(equations: Equations, shares: Array, largest: float, size: fl
         motion, more = 'the poses vary too little for their residuals', (
             'larger motions and more poses identify more')
     return f'{motion}: {listed(kinds)} cannot be distinguished; {more}'
-
-
-def _mm(meters: float) -> str:
-    return f'{1e3 * meters:.3g}'

@@ -22,6 +22,7 @@ J. American Statistical Association 90(430), 1995, doi:10.1080/01621459.1995.104
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 import math
 from typing import Any, NamedTuple
 
@@ -35,7 +36,7 @@ from stewart_dynamics.calibration.noise import covariances, whitening
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.possible_errors.hypothesis import PossibleError
+from stewart_dynamics.possible_errors.hypothesis import likeliest, PossibleError
 
 # Something is named if its Bayes factor against noise is larger; its cause, if the Bayes factor
 # against every other cause is larger than the second.
@@ -166,7 +167,6 @@ def _mean(logarithms: Array) -> Any:
 
 
 class _Cause(NamedTuple):
-    evidence: float
     what: str
     legs: tuple[int, ...]
     text: str
@@ -198,16 +198,15 @@ def lack_of_fit(platform: StewartPlatform, equations: Equations, found: Fit, unk
         residuals = _Residuals.of(found, unknowns, legs)
         if residuals.freedom < 1:
             break
-        tried = sorted([*_causes(
-            residuals, legs, equations.legs.of_a_leg, terms, sides, names, scatter), *(
-            _Cause(residuals.of_terms(each[:, legs]), what, tuple(legs), (
-                f'{_ALIKE} ({-residuals.of_each(each[:, legs])[1][0]:+.2%})'))
-            for what, each in scales.items())], reverse=True)
-        best = tried[0]
-        if best.evidence < _NAMED:
+        alike = sorted(likeliest(((-evidence, cause) for evidence, cause in chain(_causes(
+            residuals, legs, equations.legs.of_a_leg, terms, sides, names, scatter), (
+            (residuals.of_terms(each[:, legs]), _Cause(what, tuple(legs), (
+                f'{_ALIKE} ({-residuals.of_each(each[:, legs])[1][0]:+.2%})')))
+            for what, each in scales.items()))), -_NAMED, _CLEARLY, logarithms=True))
+        if not alike:
             break
-        likely = dict.fromkeys(
-            each.what for each in tried if each.evidence > best.evidence - _CLEARLY)
+        best = alike[0][1]
+        likely = dict.fromkeys(each.what for _, each in alike)
         if likely.keys() == {_SCALE, _DEVICE}:
             causes.append((_EITHER, best.text))
         else:
@@ -281,8 +280,8 @@ def _terms(platform: StewartPlatform, equations: Equations, found: Fit, fixed: F
 
 def _causes(residuals: _Residuals, legs: Sequence[int], of_a_leg: int, terms: dict[str, Array],
             sides: Sequence[Array], names: Sequence[str], scatter: Sequence[str],
-            ) -> Iterator[_Cause]:
-    """Yield the causes of larger residuals of single legs, and of all."""
+            ) -> Iterator[tuple[float, _Cause]]:
+    """Yield the causes of larger residuals of single legs, and of all, with their evidence."""
     count, place = len(residuals.whiten), {leg: n for n, leg in enumerate(legs)}
 
     def of_legs(values: Array, which: Sequence[int]) -> Array:
@@ -296,12 +295,12 @@ def _causes(residuals: _Residuals, legs: Sequence[int], of_a_leg: int, terms: di
         # As many terms as poses explain any scatter.
         few = each.shape[2] + of_a_leg > count
         for leg in legs:
-            yield _Cause(residuals.of_noise(place[leg]) if what == _POSE and few else
-                         residuals.of_terms(of_legs(each, [leg])), what, (leg,), names[leg] + (
-                f' ({-residuals.of_each(of_legs(each, [leg]))[1][0]:+.2%})'
-                if what == _SCALE else ''))
+            yield residuals.of_noise(place[leg]) if what == _POSE and few else (
+                residuals.of_terms(of_legs(each, [leg]))), _Cause(what, (leg,), names[leg] + (
+                    f' ({-residuals.of_each(of_legs(each, [leg]))[1][0]:+.2%})'
+                    if what == _SCALE else ''))
         if not (what == _POSE and few):
-            yield _Cause(residuals.of_terms(of_legs(each, legs)), what, tuple(legs), _ALL)
+            yield residuals.of_terms(of_legs(each, legs)), _Cause(what, tuple(legs), _ALL)
     for leg in legs:
         rules = [residuals.of_each(of_legs(_splits(values[:, leg])[:, None].repeat(6, axis=1), [
             leg])) for values in sides]
@@ -309,7 +308,7 @@ def _causes(residuals: _Residuals, legs: Sequence[int], of_a_leg: int, terms: di
             place[leg])
         best = max(range(len(rules)), key=lambda n: float(rules[n][0].max()))
         evidence, amplitudes = rules[best]
-        yield _Cause(_mean(np.array([side, noise])), _PLAY, (leg,), (
+        yield _mean(np.array([side, noise])), _Cause(_PLAY, (leg,), (
             f'{names[leg]} (+-{1e6 * abs(amplitudes[int(np.argmax(evidence))]):.3g} um, the side '
             f'changes with {_SIDES[best]})' if side > noise else scatter[leg]))
 

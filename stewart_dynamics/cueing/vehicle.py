@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 import math
 from typing import Any
@@ -17,6 +17,8 @@ from stewart_dynamics.arrays import Array, SECOND
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.stamp_order import NO_STAMP
 from stewart_dynamics.parameters.table import Parameters, SPECIFIC_FORCE
+from stewart_dynamics.possible_errors.hypothesis import (
+    find_errors, First, Hypothesis, likeliest, PossibleError, Table, When)
 from stewart_dynamics.possible_errors.transforms import axes_and_signs
 from stewart_dynamics.setpoints.input_messages import SampleReader, VEHICLE
 from stewart_dynamics.setpoints.rejections import check_stamp, Rejections
@@ -32,18 +34,20 @@ _STILL_FORCE, _STILL_RATE = 0.03, 0.02
 _LEAST_RATE = 10.0  # of messages [Hz]
 _FASTEST = 20.0  # turns, as degrees would be [rad/s]
 _FASTEST_MEAN = 4.0  # mean rate of turns of half a minute [rad/s]
-_MOST_TURNS = 6.0 * math.pi  # of roll or pitch while gravity stays where it is [rad]
+_MOST_TURNS = 3.0  # of roll or pitch while gravity stays where it is
 _UPRIGHT = 0.7  # cosine of the largest slope on which a vehicle stands
 _STEADY = 0.5  # of the mean specific force, in each block along it: gravity is always there
-# The turning of the specific force is that of the vehicle where this share of it is explained by
-# the angular velocity; other axes explain more of it by at least this; and ratios of both that
+# The turning of the specific force is that of the vehicle where the angular velocity leaves less
+# than this share of it; other axes explain more of it by at least this; and ratios of both that
 # are the same.
-_EXPLAINED, _BETTER, _SAME = 0.8, 0.2, (0.7, 1.4)
+_LEFT, _BETTER, _SAME = 0.2, 0.2, (0.7, 1.4)
 _LEAST_TURNING = 0.005  # root mean square of the turning that is looked at [rad/s]
 _NEAR = 0.15  # relative difference of units
 _UNITS = {'g': 1.0 / 9.80665, 'ft/s^2': 1.0 / 0.3048, 'cm/s^2': 100.0, 'mm/s^2': 1000.0}
 _GRAVITY = 9.80665
-_HALF = 5.0  # mean specific force that is more than that of accelerations [m/s^2]
+# Mean specific forces that are more than those of accelerations, in motion and at rest, and more
+# than any in m/s^2.
+_HALF, _FREE, _LARGEST_FORCE = 5.0, 0.5, 100.0  # [m/s^2]
 
 
 def vehicle_mistake(times: Array, forces: Array, rates: Array, kind: str) -> str:
@@ -62,9 +66,9 @@ def vehicle_mistake(times: Array, forces: Array, rates: Array, kind: str) -> str
     values = np.column_stack([forces, rates, np.abs(rates).max(axis=1)])
     blocks = np.add.reduceat(values, begins, axis=0) / np.diff(
         begins, append=len(times))[:, None]
-    found = _mistake_of(blocks[:_REST_BLOCKS], kind)
+    found = _error_in(blocks[:_REST_BLOCKS], kind)
     for begin in range(0, max(len(blocks) - _LEAST_BLOCKS, 0) + 1, _LONG_BLOCKS // 2):
-        found = found or _mistake_of(blocks[begin:begin + _LONG_BLOCKS], kind)
+        found = found or _error_in(blocks[begin:begin + _LONG_BLOCKS], kind)
     return found
 
 
@@ -72,104 +76,113 @@ def _too_slow(rate: float) -> str:
     return f'comes at {rate:.2g} Hz: must be at least {_LEAST_RATE:g} Hz, better 60 Hz'
 
 
-def _is_still(blocks: Array) -> bool:
-    """Return whether a vehicle is at rest in blocks (N, 7), as those of ``_mistake_of``."""
-    forces, rates = blocks[:, :3], blocks[:, 3:6]
-    mean = forces.mean(axis=0)
-    return bool(
-        np.abs(forces - mean).max() <= _STILL_FORCE * max(float(np.linalg.norm(mean)), _GRAVITY)
-        and np.abs(rates).max() <= _STILL_RATE)
-
-
-def _mistake_of(blocks: Array, kind: str) -> str:
+class _Blocks:
     """
-    Return the possible error in blocks (N, 7) of readings, empty without one.
+    Means over blocks of readings, with the numbers that several hypotheses need.
 
-    blocks: mean specific force [m/s^2] and angular velocity, and mean of the largest of the three
-        angular velocities [rad/s]. At rest a few will do; in motion accelerations average out over
-        some time, gravity does not.
+    blocks (N, 7): mean specific force [m/s^2] and angular velocity, and mean of the largest of the
+        three angular velocities [rad/s]. At rest a few will do; in motion accelerations average
+        out over some time, gravity does not.
+    kind: ``cueing.input``.
     """
-    fastest = blocks[:, 6]
-    if np.median(fastest) > _FASTEST:
-        return f'angular_velocity is {fastest.max():.3g} rad/s: in degrees per second?'
-    moving = not _is_still(blocks)
-    if moving and len(blocks) < _LEAST_BLOCKS:
-        return ''
-    words = (f'in the mean of {_BLOCK * len(blocks):.0f} s' if moving else 'at rest')
-    return (_mistake_of_forces(blocks[:, :3], kind, words)
-            or (_mistake_of_rates(blocks, kind, words) if moving else ''))
 
-
-def _mistake_of_forces(forces: Array, kind: str, words: str) -> str:
-    """Return the possible error in mean specific forces (N, 3) of blocks, empty without one."""
-    mean = forces.mean(axis=0)
-    size = float(np.linalg.norm(mean))
-    text = f'linear_acceleration is [{", ".join(f"{each:.3g}" for each in mean)}] m/s^2 {words}'
-    steady = size > 0.0 and bool((forces @ mean > _STEADY * size ** 2).all())
-    units = [name for name, unit in _UNITS.items()
-             if steady and abs(size / (unit * _GRAVITY) - 1.0) <= _NEAR]
-    if size > 100.0:
-        return f'{text}: in {units[0] if units else "mm/s^2"}?'
-    if kind != SPECIFIC_FORCE:
-        return '' if size < _HALF else (
-            f'{text}, but cueing.input is {kind}: it has gravity in it, set {SPECIFIC_FORCE}')
-    if units:
-        return f'{text}: in {units[0]}, must be in m/s^2'
-    if size < (_HALF if words != 'at rest' else 0.5):
-        return f'{text}, but cueing.input is {kind}: without gravity, set acceleration'
-    if mean[2] < _UPRIGHT * size:
+    def __init__(self, blocks: Array, kind: str) -> None:
+        self.forces, self.rates, fastest = blocks[:, :3], blocks[:, 3:6], blocks[:, 6]
+        self.median, self.largest, self.fastest = (
+            float(of(fastest)) for of in (np.median, np.max, np.mean))
+        self.kind, self.has_gravity = kind, kind == SPECIFIC_FORCE
+        mean = self.forces.mean(axis=0)
+        self.size, self.height = float(np.linalg.norm(mean)), float(mean[2])
+        self.is_still = bool(
+            np.abs(self.forces - mean).max() <= _STILL_FORCE * max(self.size, _GRAVITY)
+            and np.abs(self.rates).max() <= _STILL_RATE)
+        self.is_enough = self.is_still or len(blocks) >= _LEAST_BLOCKS
+        self.when = ('at rest' if self.is_still else
+                     f'in the mean of {_BLOCK * len(blocks):.0f} s')
+        self.text = (f'linear_acceleration is [{", ".join(f"{each:.3g}" for each in mean)}] m/s^2 '
+                     f'{self.when}')
+        is_steady = bool((self.forces @ mean > _STEADY * self.size ** 2).all())
+        self.unit = next((name for name, unit in _UNITS.items() if is_steady and abs(
+            self.size / (unit * _GRAVITY) - 1.0) <= _NEAR), '')
+        self.unit_or_mm = self.unit or 'mm/s^2'
         axis = int(np.argmax(np.abs(mean)))
-        return (f'{text}: gravity is along {"-+"[int(mean[axis] > 0.0)]}{"xyz"[axis]}, must be '
-                'along +z: axes swapped, or of another sign (x forward, y left, z up)')
-    return ''
+        self.along = f'{"-+"[int(mean[axis] > 0.0)]}{"xyz"[axis]}'
+        self.up = self.forces / np.maximum(
+            np.linalg.norm(self.forces, axis=1, keepdims=True), 1e-9)
+        self.turned = np.ptp(np.cumsum(self.rates[:, :2], axis=0) * _BLOCK, axis=0) / (
+            2.0 * math.pi)
+        self.about = ['roll', 'pitch']
+
+    def turning_errors(self) -> Iterator[PossibleError]:
+        """
+        Yield an error in the angular velocities by which gravity does not turn.
+
+        In the axes of the vehicle gravity u turns as u' = -w x u. Where the specific force turns
+        like that, but for a factor, a sign or the order of axes, these are wrong. Turning about
+        gravity is not seen, and nothing is where accelerations turn the specific force more than
+        the vehicle.
+        """
+        change = np.diff(self.up, axis=0) / _BLOCK
+        middle, turning = (0.5 * (each[1:] + each[:-1]) for each in (self.up, self.rates))
+        if np.sqrt((change ** 2).sum(axis=1).mean()) < _LEAST_TURNING:
+            return
+
+        def fit(axes: Sequence[int], signs: Sequence[float]) -> tuple[float, float]:
+            """Return the share that rates of other axes do not explain, and their factor."""
+            by_rates = np.cross(middle, turning[:, axes] * signs)
+            product, square = float((change * by_rates).sum()), float((by_rates ** 2).sum())
+            if square < 1e-12:
+                return 1.0, 0.0
+            return 1.0 - product ** 2 / square / float((change ** 2).sum()), product / square
+
+        left, factor = fit([0, 1, 2], [1.0] * 3)
+        if left < _LEFT and _SAME[0] < math.degrees(factor) < _SAME[1]:
+            yield PossibleError('unit', f'angular_velocity is {1.0 / factor:.0f} times the '
+                                f'turning of gravity: {_DEGREES}')
+            return
+        # Fewest changes first: where gravity does not turn about an axis, its sign is not known.
+        largest = min(_LEFT, (left if factor > 0.0 else 1.0) - _BETTER)
+        tried = ((*fit(*each), each) for each in axes_and_signs())
+        for _, (axes, signs) in likeliest(
+                ((left, each) for left, factor, each in tried if _SAME[0] < factor < _SAME[1]),
+                largest, exact=largest)[:1]:
+            found = ' '.join(f'{"-" * (sign < 0.0)}{"xyz"[axis]}'
+                             for axis, sign in zip(axes, signs, strict=True))
+            yield PossibleError('axes', f'angular_velocity: gravity turns as by x y z = {found} '
+                                'of it: axes swapped, or of another sign')
 
 
-def _mistake_of_rates(blocks: Array, kind: str, words: str) -> str:
-    """
-    Return the possible error in the angular velocities of a motion, empty without one.
+_Of = Hypothesis[_Blocks]
+_DEGREES = 'in degrees per second?'
+_TABLE: Table[_Blocks] = First(
+    _Of('unit', lambda b: b.median - _FASTEST,
+        f'angular_velocity is {{largest:.3g}} rad/s: {_DEGREES}'),
+    When(lambda b: b.is_enough, First(
+        _Of('unit', lambda b: b.size - _LARGEST_FORCE, '{text}: in {unit_or_mm}?'),
+        When(lambda b: not b.has_gravity, _Of('gravity', lambda b: b.size >= _HALF, (
+            f'{{text}}, but cueing.input is {{kind}}: it has gravity in it, set {SPECIFIC_FORCE}'
+        ))),
+        When(lambda b: b.has_gravity, First(
+            _Of('unit', lambda b: len(b.unit), '{text}: in {unit}, must be in m/s^2'),
+            _Of('gravity', lambda b: (_FREE if b.is_still else _HALF) - b.size, (
+                '{text}, but cueing.input is {kind}: without gravity, set acceleration')),
+            _Of('axes', lambda b: _UPRIGHT * b.size - b.height, (
+                '{text}: gravity is along {along}, must be along +z: axes swapped, or of another '
+                'sign (x forward, y left, z up)')))),
+        When(lambda b: not b.is_still, First(
+            _Of('unit', lambda b: b.fastest - _FASTEST_MEAN,
+                f'angular_velocity is {{fastest:.3g}} rad/s {{when}}: {_DEGREES}'),
+            When(lambda b: b.has_gravity, First(
+                _Of('unit', lambda b: np.where(
+                    (b.up @ b.up.mean(axis=0)).min() > _UPRIGHT, b.turned - _MOST_TURNS, 0.0), (
+                    'angular_velocity turns the vehicle by {turned:.0f} turns of {about}, but '
+                    f'gravity stays along +z: {_DEGREES}')),
+                lambda b: b.turning_errors())))))))
 
-    In the axes of the vehicle gravity u turns as u' = -w x u. Where the specific force turns like
-    that, but for a factor, a sign or the order of axes, these are wrong. Turning about gravity is
-    not seen, and nothing is where accelerations turn the specific force more than the vehicle.
-    """
-    forces, rates, fastest = blocks[:, :3], blocks[:, 3:6], blocks[:, 6]
-    degrees = 'in degrees per second?'
-    if fastest.mean() > _FASTEST_MEAN:
-        return f'angular_velocity is {fastest.mean():.3g} rad/s {words}: {degrees}'
-    if kind != SPECIFIC_FORCE:
-        return ''
-    sizes = np.linalg.norm(forces, axis=1, keepdims=True)
-    up = forces / np.maximum(sizes, 1e-9)
-    turns = np.ptp(np.cumsum(rates[:, :2], axis=0) * _BLOCK, axis=0)
-    if turns.max() > _MOST_TURNS and (up @ up.mean(axis=0)).min() > _UPRIGHT:
-        return (f'angular_velocity turns the vehicle by {turns.max() / (2.0 * math.pi):.0f} turns '
-                f'of {("roll", "pitch")[int(np.argmax(turns))]}, but gravity stays along '
-                f'+z: {degrees}')
-    change = np.diff(up, axis=0) / _BLOCK
-    middle, turning = 0.5 * (up[1:] + up[:-1]), 0.5 * (rates[1:] + rates[:-1])
-    if np.sqrt((change ** 2).sum(axis=1).mean()) < _LEAST_TURNING:
-        return ''
 
-    def fit(axes: Sequence[int], signs: Sequence[float]) -> tuple[float, float]:
-        """Return the share that rates of other axes explain, and the factor of these."""
-        by_rates = np.cross(middle, turning[:, axes] * signs)
-        product, square = float((change * by_rates).sum()), float((by_rates ** 2).sum())
-        if square < 1e-12:
-            return 0.0, 0.0
-        return product ** 2 / square / float((change ** 2).sum()), product / square
-
-    share, factor = fit([0, 1, 2], [1.0] * 3)
-    if share > _EXPLAINED and _SAME[0] < math.degrees(factor) < _SAME[1]:
-        return f'angular_velocity is {1.0 / factor:.0f} times the turning of gravity: {degrees}'
-    share = share if factor > 0.0 else 0.0
-    # Fewest changes first: where gravity does not turn about an axis, its sign is not known.
-    for axes, signs in axes_and_signs():
-        other, factor = fit(axes, signs)
-        if other > max(_EXPLAINED, share + _BETTER) and _SAME[0] < factor < _SAME[1]:
-            return 'angular_velocity: gravity turns as by x y z = ' + ' '.join(
-                f'{"-" * (sign < 0.0)}{"xyz"[axis]}' for axis, sign in zip(
-                    axes, signs, strict=True)) + ' of it: axes swapped, or of another sign'
-    return ''
+def _error_in(blocks: Array, kind: str) -> str:
+    """Return the possible error in blocks (N, 7) of readings, empty without one."""
+    return next((each.text for each in find_errors(_TABLE, _Blocks(blocks, kind))), '')
 
 
 class Vehicle:
@@ -248,13 +261,13 @@ class Vehicle:
         if len(blocks) < _LEAST_RESTING:
             return
         last = blocks[-_REST_BLOCKS:]
-        found = _mistake_of(last, self.kind)
-        if not found and _is_still(last):
+        found = _error_in(last, self.kind)
+        if not found and _Blocks(last, self.kind).is_still:
             # At rest and right: readings before are another drive.
             while len(self._blocks) > _REST_BLOCKS:
                 self._blocks.popleft()
         elif not found and (len(blocks) >= _LEAST_BLOCKS or not self.mistake):
-            found = _mistake_of(blocks, self.kind)
+            found = _error_in(blocks, self.kind)
         elif not found:
             found = self.mistake
         self.mistake = found

@@ -22,14 +22,12 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.possible_errors.hypothesis import PossibleError
 from stewart_dynamics.possible_errors.transforms import best_order
 from stewart_dynamics.setpoints.consistency import Consistency
-from stewart_dynamics.setpoints.inconsistency import factor_words, VELOCITY
+from stewart_dynamics.setpoints.inconsistency import reason_of, Sums, VELOCITY
 
 # Measurements in which legs and reason are found, and the length of windows in them [s].
 _RECENT, _WINDOW = 2000, 0.05
 # A leg is wrong, and a reason explains it, from this part of the motion (squared).
 _WRONG, _EXPLAINED = 0.02, 0.05
-# Velocities are zero below this part of the motion (squared).
-_ZERO = 1e-12
 
 
 class RateCheck:
@@ -81,23 +79,16 @@ def _words(recent: Sequence[Measurement], joints: Sequence[str], late: str, unit
         name for name, is_wrong in zip(joints, wrong, strict=True) if is_wrong) + ': '
     by_rates, by_positions = (
         float(np.sqrt(each[wrong].mean() / np.sum(seconds ** 2))) for each in (all_given, moved))
-    reason = _reason(expected[:, wrong], given[:, wrong], float(np.mean(steps)))
+    sums = Sums(0)
+    sums.periods, sums.step = 1, float(np.mean(steps))
+    sums.squares = np.array([each[wrong].sum() for each in (moved, all_given, off)])
+    sums.product = float(np.sum((expected * given)[:, wrong]))
+    reason = reason_of(VELOCITY, sums, None)
     if not reason and (order := _order(expected, given)):
         reason = f'in another order, {", ".join(joints[n] for n in order)}?'
     reason = reason or late
     return (f'velocity is not the derivative of position: {of}{by_rates:.3g} {unit} RMS, by the '
             f'positions {by_positions:.3g} {unit}' + (f': {reason}' if reason else ''))
-
-
-def _reason(expected: Array, given: Array, step: float) -> str:
-    """Return that legs are zero or have one factor, empty otherwise; step: between samples [s]."""
-    dd, uu, product = (float(np.sum(each)) for each in (
-        expected ** 2, given ** 2, expected * given))
-    if uu <= _ZERO * dd:
-        return 'it is zero, never filled?'
-    if product ** 2 < (1.0 - _EXPLAINED) * dd * uu:
-        return ''
-    return factor_words(VELOCITY, uu / product, step)
 
 
 def _order(expected: Array, given: Array) -> Sequence[int]:

@@ -29,7 +29,7 @@ from stewart_dynamics.mechanics.drives.measured_efforts import (
     FAR, known_scales, mistake_of_scale)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.possible_errors.hypothesis import PossibleError
+from stewart_dynamics.possible_errors.hypothesis import likeliest, PossibleError
 from stewart_dynamics.possible_errors.transforms import swapped_pairs
 
 # A residual above this fraction of the efforts starts the search for swapped legs.
@@ -104,9 +104,11 @@ class Comparison:
         return (weight * float(left @ self._gram @ left) + float(z @ z)
                 + self._unknowns.misfit_of_mass(float(z[0])))
 
-    def relative(self, scale: float = 1.0, delay: float = 0.0) -> float:
-        """Return the RMS misfit, relative to the efforts."""
-        return _ROUGHLY * math.sqrt(self.misfit(scale, delay) / max(self._rows, 1))
+    def likeliest_scales(self, scales: Iterable[float], largest: float = math.inf) -> list[float]:
+        """Return the scale with the smallest misfit, if it fits well, see ``likeliest``."""
+        well = (_WELL / _ROUGHLY) ** 2 * max(self._rows, 1)
+        return [each for _, each in likeliest(
+            ((self.misfit(each), each) for each in scales), min(largest, well))]
 
     def _solved(self, scale: float) -> tuple[float, Array]:
         """Return the weight of the efforts, and the covariance of the unknowns."""
@@ -148,20 +150,15 @@ def of_delay(delays: Iterable[float]) -> Iterator[PossibleError]:
 
 def of_efforts(comparison: Comparison, p: Parameters, of_motors: bool) -> Iterator[PossibleError]:
     """Yield a possible error in sign or unit of the efforts."""
-    scales = comparison.best_scales()
-    if scales[0] == 0.0:
-        likeliest = 0.0
-    else:
-        likeliest = min((1.0, *scales), key=comparison.misfit)
-        if (comparison.misfit() - comparison.misfit(likeliest) < _CLEARLY
-                or comparison.relative(likeliest) > _WELL):
-            return
+    best = comparison.best_scales()
+    if best[0] != 0.0:
+        best = comparison.likeliest_scales(best, comparison.misfit() - _CLEARLY)
+    for scale in best[:1]:
         # a known one, though the mass of the file is far off
-        known = [each for each in known_scales(p, of_motors)
-                 if 1.0 / FAR < each / likeliest < FAR and comparison.relative(each) < _WELL]
-        likeliest = min(known, key=comparison.misfit, default=likeliest)
-    if mistake := mistake_of_scale(likeliest, p, of_motors):
-        yield PossibleError(*mistake)
+        known = comparison.likeliest_scales(each for each in known_scales(p, of_motors)
+                                            if scale and 1.0 / FAR < each / scale < FAR)
+        if mistake := mistake_of_scale([*known, scale][0], p, of_motors):
+            yield mistake
 
 
 def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit,
@@ -180,16 +177,16 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
     platform, piece = extraction.platform, most_motion(window, extraction)
     undelayed = copy(extraction)  # the delay that fits wrong legs best may be any
     undelayed.later = 0.0
-    swaps, now = [], math.inf
+    swaps: list[tuple[float, tuple[str, int, int]]] = []
     with suppress(PoseError, SingularityError):
         tried = [(each(piece, first_pose(platform, piece)).extract, delay)
                  for each, delay in ((extraction, fit.delays[0]), (undelayed, 0.0))]
         own = [_of_legs(platform, extract, _LEGS, unknowns) for extract, _ in tried]
         now = _misfit(own[0], _LEGS, unknowns, fit.delays[0])
-        swaps = [each for each in _swaps(platform, tried, own, unknowns)
-                 if now - each[0] > _CLEARLY and each[0] < (min(_BETTER, left) ** 2) * now]
+        swaps = likeliest(_swaps(platform, tried, own, unknowns),
+                          min(min(_BETTER, left) ** 2 * now, now - _CLEARLY))
     if swaps:
-        misfit, which, a, b = min(swaps)
+        misfit, (which, a, b) = swaps[0]
         yield PossibleError(
             'swapped', f'the {which} of {p.joints[a]} and {p.joints[b]} look swapped: the '
             f'residual becomes {math.sqrt(misfit / now):.2f} times as large')
@@ -234,7 +231,7 @@ def most_motion(window: Window, extraction: Extraction, longer: float = 0.0) -> 
 
 def _swaps(platform: StewartPlatform, tried: Sequence[tuple[Extract, float]],
            own: Sequence[Extract | None], unknowns: Unknowns,
-           ) -> Iterator[tuple[float, str, int, int]]:
+           ) -> Iterator[tuple[float, tuple[str, int, int]]]:
     """
     Yield the least squared misfit of extracts with delays [s], if two legs are swapped.
 
@@ -245,7 +242,7 @@ def _swaps(platform: StewartPlatform, tried: Sequence[tuple[Extract, float]],
         for which, extracts, of_efforts in (('positions and efforts', others, order),
                                             ('efforts', own, order), ('positions', others, _LEGS)):
             yield min(_misfit(extract, of_efforts, unknowns, delay) for extract, (_, delay) in zip(
-                extracts, tried, strict=True)), which, a, b
+                extracts, tried, strict=True)), (which, a, b)
 
 
 def _of_legs(platform: StewartPlatform, extract: Extract, order: Sequence[int],

@@ -12,12 +12,13 @@ ends. Base joints and platform joints are numbers of all kinds; each kind adds i
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.possible_errors.hypothesis import PossibleError
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -230,8 +231,8 @@ class CalibratedLegs(ABC):
         """Return the parameters of a file that hold a parameter of ``calibrated``."""
 
     @abstractmethod
-    def mistakes_of(self, values: Array, size: float) -> Iterator[tuple[str, str]]:
-        """Yield keyword and text of possible errors that show in calibrated numbers (n,)."""
+    def possible_errors(self, values: Array, size: float) -> Iterable[PossibleError]:
+        """Return possible errors that show in calibrated numbers (n,); size: of the hexapod."""
 
 
 def listed_groups(legs: CalibratedLegs) -> str:

@@ -12,9 +12,10 @@ the turn t of the axis as a rotation vector, and the zero z,
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
+from itertools import chain
 import math
-from typing import Any, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from stewart_dynamics.legs.calibrated import (
     AXES, BASE_JOINTS, Calibrated, CalibratedLegs, CalibratedLines, ComparedPositions, LENGTHS,
     PLATFORM_JOINTS, ZERO, ZeroStep)
 from stewart_dynamics.legs.lines import dot, skew
+from stewart_dynamics.possible_errors.hypothesis import (
+    find_errors, Hypothesis, PossibleError)
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -222,17 +225,27 @@ class CrankCalibration(CalibratedLegs):
         """Return the points of the servos for zeros, where a file has them."""
         return SERVO_POINTS if name == DIRECTIONS and self._has_servos else (name,)
 
-    def mistakes_of(self, values: Array, size: float) -> Iterator[tuple[str, str]]:
-        """Yield lengths that are those of other cranks or rods."""
+    def possible_errors(self, values: Array, size: float) -> Iterable[PossibleError]:
+        """Return lengths that are those of other cranks or rods."""
         p = self.parameters
-        for name in (CRANK_LENGTH, ROD_LENGTH):
-            found = values[self.parts[name]]
-            ratios = np.abs(found / p[name] - 1.0)
-            if ratios.max() > _FARTHEST:
-                leg = int(np.argmax(ratios))
-                before = np.broadcast_to(p[name], 6)[leg]
-                yield 'far', (f'{name} of {p.joints[leg]} would become {found[leg]:.4g} m in '
-                              f'place of {before:.4g} m: the angles are not those of this hexapod')
+        return chain.from_iterable(find_errors(_OTHER_LENGTHS, _Lengths(
+            name, list(p.joints), values[self.parts[name]], np.broadcast_to(p[name], 6)))
+            for name in (CRANK_LENGTH, ROD_LENGTH))
+
+
+class _Lengths(NamedTuple):
+    """Lengths of cranks or rods (6,), calibrated and in the file [m]."""
+
+    name: str
+    leg: list[str]
+    found: Array
+    before: Array
+
+
+_OTHER_LENGTHS = Hypothesis[_Lengths](
+    'far', lambda s: np.abs(s.found / s.before - 1.0) - _FARTHEST, (
+        '{name} of {leg} would become {found:.4g} m in place of {before:.4g} m: the angles are '
+        'not those of this hexapod'))
 
 
 def _near(angles: Array) -> Array:

@@ -5,14 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.legs.calibrated import (
     Calibrated, CalibratedLegs, CalibratedLines, ComparedPositions, ZERO)
+from stewart_dynamics.possible_errors.hypothesis import (
+    find_errors, First, Hypothesis, PossibleError, Table)
 
 ZERO_LENGTH = Calibrated('geometry.zero_length', 'zero lengths', 'm', ZERO)
 # Zero lengths that become a smaller part of the file's are those of whole lengths; zero lengths
@@ -77,18 +79,26 @@ class TelescopicCalibration(CalibratedLegs):
         """Return the parameter itself."""
         return name,
 
-    def mistakes_of(self, values: Array, size: float) -> Iterator[tuple[str, str]]:
-        """Yield positions that are whole lengths, or relative to another length."""
-        zero = self.own_values()
-        off = np.abs(values[self.zero] - zero)
-        if (zero > _FARTHEST * size).all() and (
-                np.abs(values[self.zero]) < _WHOLE * zero).all():
-            yield 'zero_length', (
-                'the leg positions are whole lengths between the joints, not positions '
-                'from geometry.zero_length; if the hexapod publishes them so, it is zero')
-        elif off.max() > _FARTHEST * size:
-            worst = int(off.argmax())
-            yield 'zero_length', (
-                f'geometry.zero_length of {self.parameters.joints[worst]} would become '
-                f'{values[self.zero][worst]:.4g} m in place of {zero[worst]:.4g} m: are the leg '
-                'positions relative to home, or to another length?')
+    def possible_errors(self, values: Array, size: float) -> Iterable[PossibleError]:
+        """Return positions that are whole lengths, or relative to another length."""
+        return find_errors(_ZEROS, _Zeros(list(self.parameters.joints), self.own_values(),
+                                          values[self.zero], _FARTHEST * size))
+
+
+class _Zeros(NamedTuple):
+    """Zeros of the legs (6,), in the file and calibrated, and the farthest change [m]."""
+
+    leg: list[str]
+    zero: Array
+    found: Array
+    far: float
+
+
+_ZEROS: Table[_Zeros] = First(
+    Hypothesis('zero_length', lambda s: (
+        (s.zero > s.far) & (np.abs(s.found) < _WHOLE * s.zero)).all(), (
+        'the leg positions are whole lengths between the joints, not positions from '
+        'geometry.zero_length; if the hexapod publishes them so, it is zero')),
+    Hypothesis('zero_length', lambda s: np.abs(s.found - s.zero) - s.far, (
+        'geometry.zero_length of {leg} would become {found:.4g} m in place of {zero:.4g} m: are '
+        'the leg positions relative to home, or to another length?')))

@@ -128,7 +128,7 @@ def lines_of(errors: Iterable[PossibleError]) -> Iterator[str]:
 
 
 def likeliest(tried: Iterable[tuple[float, T]], largest: float, alike: float = 1.0,
-              exact: float = 0.0) -> list[tuple[float, T]]:
+              exact: float = 0.0, logarithms: bool = False) -> list[tuple[float, T]]:
     """
     Return the hypotheses with the smallest misfit, in the order in which they were tried.
 
@@ -136,9 +136,12 @@ def likeliest(tried: Iterable[tuple[float, T]], largest: float, alike: float = 1
     largest: misfits from this one on are no evidence for an error.
     alike: misfits up to this multiple of the smallest explain the data as well.
     exact: misfits below it are all the same.
+    logarithms: misfits are logarithms, of likelihoods those of their inverse; ``largest`` is one,
+        too, and ``alike`` is that of the multiple.
     """
     each = [*tried]
     best = min((misfit for misfit, _ in each), default=math.inf)
     if not best < largest:
         return []
-    return [(misfit, of) for misfit, of in each if misfit <= max(alike * best, exact)]
+    most = best + alike if logarithms else max(alike * best, exact)
+    return [(misfit, of) for misfit, of in each if misfit <= most]

@@ -109,7 +109,7 @@ def reason_of(quantity: str, sums: Sums, frame: tuple[str, str] | None) -> str:
     similar = sums.product * sums.product / (dd * uu) if dd > 0.0 else 0.0
     if similar > 0.0:
         # Noise is in the differences of poses, rather than in the integral.
-        found.append((1.0 - similar, factor_words(
+        found.append((1.0 - similar, _factor_words(
             quantity, uu / sums.product, sums.step / sums.periods)))
     product, square = sums.late.tolist()
     if square > 0.0:
@@ -144,7 +144,7 @@ def _of_axes(quantity: str, sums: Sums, axes: str, body: str) -> Iterator[tuple[
                    f'gravity is in it, {listed(constant.round(2), 3)} m/s^2?')
 
 
-def factor_words(quantity: str, factor: float, step: float) -> str:
+def _factor_words(quantity: str, factor: float, step: float) -> str:
     """Return a constant factor in words, with the mistake that has it."""
     words = name_of_factor(factor, _FACTORS[quantity].items(), 1.0 + _NEAR)
     if abs(factor / step - 1.0) < _NEAR:

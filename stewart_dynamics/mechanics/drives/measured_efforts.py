@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
@@ -99,6 +99,7 @@ class EffortSums:
 
     def __init__(self, parameters: Parameters, of_motors: bool = False) -> None:
         self._parameters, self._of_motors = parameters, of_motors
+        self.leg, self.kind = list(parameters.joints), parameters.leg_kind
         self.count = 0.0
         self.measured, self.computed = np.zeros((2, 6))  # [N]
         self.measured_squares, self.computed_squares = np.zeros((2, 6))  # [N^2]
@@ -134,7 +135,7 @@ class EffortSums:
         scale = self._scale()
         found = None if scale is None else mistake_of_scale(
             scale, self._parameters, self._of_motors)
-        return found or self._of_one_leg() or self._swapped()
+        return found or next(find_errors(_ONE_LEG, self), None) or self._swapped()
 
     def _scale(self) -> float | None:
         """Return the factor from computed to measured forces; None if they are not alike."""
@@ -150,29 +151,26 @@ class EffortSums:
         """Return the squared differences of measured and computed forces (6,) [N^2]."""
         return self.measured_squares - 2.0 * self.own_products + self.computed_squares
 
-    def _of_one_leg(self) -> PossibleError | None:
-        """Return the error in one leg's sign, if the other legs are right; a load moves all."""
-        leg, joints = int(np.argmax(self._residuals)), self._parameters.joints
-        residual = float(self._residuals[leg])
-        if not self.computed_squares[leg] or (
-                float(self._residuals.sum()) - residual > _OTHERS * residual):
-            return None
-        if not self.measured_squares[leg]:
-            return PossibleError(ZERO, f'the effort of {joints[leg]} is zero')
-        product = self.products[leg, leg]
-        if _is_near(product / self.computed_squares[leg], -1.0) and (
-                product ** 2 > _ALIKE ** 2 * self.measured_squares[leg]
-                * self.computed_squares[leg]):
-            return PossibleError(SIGN, (
-                f'the effort of {joints[leg]} has the opposite sign of those of the other legs: '
-                f'{self._parameters.leg_kind.right_sign}'))
-        return None
+    @property
+    def alone(self) -> Flags:
+        """Return whether the other legs are right (6,); a load moves all."""
+        each = self._residuals
+        alone: Flags = (each.sum() - each <= _OTHERS * each) & (self.computed_squares > 0.0)
+        return alone
+
+    @property
+    def opposite(self) -> Flags:
+        """Return whether measured and computed forces are alike but for the sign (6,)."""
+        sizes, products = self.computed_squares, self.own_products
+        opposite: Flags = (sizes < -_NEAR * products) & (-products < _NEAR * sizes) & (
+            products ** 2 > _ALIKE ** 2 * self.measured_squares * sizes)
+        return opposite
 
     def _swapped(self) -> PossibleError | None:
         """Return the two legs whose efforts are swapped, if they vary and show it."""
         if not self.count:
             return None
-        number, joints = self.count, self._parameters.joints
+        number, joints = self.count, self.leg
         varying = self.products - np.outer(self.measured, self.computed) / number
         means = (self.measured - self.computed) ** 2 / number
         residuals = float(self._residuals.sum()), float(np.sum(self._residuals - means))
@@ -186,6 +184,14 @@ class EffortSums:
             f'the efforts of {one} and {other} look swapped: the residual becomes '
             f'{np.sqrt(max(misfit, 0.0)):.2f} times as large'))
             for misfit, (one, other) in likeliest(tried, _BETTER)), None)
+
+
+_ONE_LEG: Table[EffortSums] = First(
+    Hypothesis(ZERO, lambda s: s.alone & (s.measured_squares == 0.0),
+               'the effort of {leg} is zero'),
+    Hypothesis(SIGN, lambda s: s.alone & s.opposite, (
+        'the effort of {leg} has the opposite sign of those of the other legs: '
+        '{kind.right_sign}')))
 
 
 class _Scale:
