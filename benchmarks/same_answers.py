@@ -232,7 +232,7 @@ def joined(given: dict[str, Any], found: list[tuple[str, int, bytes]], cuts: lis
         'setpoints': f'{sum(len(each.stamps) for each in batches)}',
         'notices': f'{notices}',
         'counts': f'{sorted(setpoints.counts.items())}', 'firsts': f'{sorted(firsts.items())}',
-        'mistakes': f'{setpoints.mistakes(True)} {setpoints.mistakes()}',
+        'mistakes': f'{setpoints.possible_errors(True)} {setpoints.possible_errors()}',
         'base': f'{setpoints.base.last}'}
     if cuts is None:
         answers['said'] = digest(f'{said}'.encode())

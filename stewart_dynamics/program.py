@@ -73,11 +73,15 @@ class Program:
             parser.add_argument('--strict', action='store_true',
                                 help=f'exit code {STRICT} when {self._strict}')
 
-    def prepare(self, mistakes: Iterable[str]) -> None:
+    def prepare(self, errors: Iterable[str]) -> None:
         """Print possible errors, and keep memory that is freed."""
         _keep_freed_memory()
-        for mistake in mistakes:
-            self.complain(f'warning: {mistake}')
+        self.warn(errors)
+
+    def warn(self, texts: Iterable[str]) -> None:
+        """Print warnings, each in one line."""
+        for text in texts:
+            self.complain(f'warning: {text}')
 
     def exit_code(self, run: Callable[[], int]) -> int:
         """Run and return the exit code; errors of any kind end it with one line on stderr."""
@@ -305,7 +309,7 @@ def add_motor_efforts(group: argparse._ArgumentGroup) -> None:
 def add_accepted(parser: argparse._ActionsContainer) -> None:
     """Add the option that writes results in spite of a possible error."""
     parser.add_argument('--accept-mistakes', action='store_true',
-                        help='write results although a mistake is likely')
+                        help='write results although a possible error is found')
 
 
 def add_report(parser: argparse._ActionsContainer) -> None:

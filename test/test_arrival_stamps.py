@@ -41,7 +41,7 @@ def stamps_of(times: Array) -> Stamps:
 
 
 def found(stamps: Stamps, values: Array) -> str:
-    """Return the mistake that is found, in many readings and in one after the other."""
+    """Return the error that is found, in many readings and in one after the other."""
     one, many = ArrivalStamps(), ArrivalStamps()
     for stamp, value in zip(stamps.tolist(), values.tolist(), strict=True):
         one.add_readings([stamp], [value])
@@ -64,7 +64,7 @@ def test_bursts_are_found(rate: float, noise: float) -> None:
 
 
 @pytest.mark.parametrize('rate', RATES)
-def test_other_uneven_stamps_are_no_mistake(rate: float) -> None:
+def test_other_uneven_stamps_are_no_possible_error(rate: float) -> None:
     random = rng(2)
     for noise in (0.0, 1e-5, 1e-3):
         t, values = readings(rate, noise)
@@ -88,7 +88,7 @@ def test_other_uneven_stamps_are_no_mistake(rate: float) -> None:
     assert not found(in_bursts(t, 4), np.full((len(t), 6), 1e200) * noise_alone)
 
 
-def test_the_mistake_is_present_until_readings_show_that_it_has_ended() -> None:
+def test_the_possible_error_is_present_until_readings_show_that_it_has_ended() -> None:
     t, values = readings(100.0)
     check = ArrivalStamps()
     bursts, third = in_bursts(t, 4), len(t) // 3
@@ -114,11 +114,11 @@ def test_stamps_of_an_imu_and_of_a_tracker_on_the_base_are_checked(source: str, 
         else:
             feed(BASE_POSE, messages.pose(stamp, quaternion=[
                 np.sin(roll[n] / 2.0), 0.0, 0.0, np.cos(roll[n] / 2.0)], frame='world'))
-    said = [each.words for each in feed.setpoints.mistakes(ever=True)]
+    said = [each.words for each in feed.setpoints.possible_errors(ever=True)]
     assert len(said) == (size > 1)
     begin = f'base/{source}: possible error: stamps of arrival'
     assert all(each.startswith(begin) for each in said)
-    assert len(feed.setpoints.mistakes()) == len(said)
+    assert len(feed.setpoints.possible_errors()) == len(said)
 
 
 @pytest.mark.parametrize('size', [1, 4])

@@ -26,7 +26,7 @@ from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     linear_parameters, parameter_values, with_point_mass)
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 from stewart_dynamics.parameters.body import Body
 from stewart_dynamics.parameters.table import inertia_matrix, payload_values
 
@@ -130,7 +130,7 @@ def test_without_a_mass_it_is_the_file_bit_for_bit() -> None:
     assert np.array_equal(linear_parameters(no_mass), linear_parameters(FILE))
     assert Unknowns(no_mass).theta(Unknowns(no_mass).start).tolist() == Unknowns(FILE).theta(
         Unknowns(FILE).start).tolist()
-    assert likely_mistakes(no_mass) == likely_mistakes(FILE)
+    assert find_parameter_errors(no_mass) == find_parameter_errors(FILE)
 
 
 def test_merged_parameters_are_the_same_hexapod_bit_for_bit() -> None:
@@ -191,9 +191,10 @@ def test_a_description_has_both_as_one_body(tmp_path: Path, kind: str) -> None:
     ({'payload.inertia': [9e6, 0.0, 0.0, 9e6, 0.0, 9e6]}, 'payload.inertia: 9e+06 kg m^2 at most'),
     ({'payload.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, 9.0]},
      'payload.inertia: principal moments [1, 1, 9] kg m^2: no body has one larger')])
-def test_likely_mistakes_in_a_payload(changes: dict[str, object], expected: str) -> None:
-    assert likely_mistakes(WITH_DRIVER) == likely_mistakes(FILE)
-    more = set(likely_mistakes(WITH_DRIVER.replaced(changes))) - set(likely_mistakes(FILE))
+def test_possible_errors_in_a_payload(changes: dict[str, object], expected: str) -> None:
+    assert find_parameter_errors(WITH_DRIVER) == find_parameter_errors(FILE)
+    more = {*find_parameter_errors(WITH_DRIVER.replaced(changes))} - {
+        *find_parameter_errors(FILE)}
     assert [each for each in more if each.startswith(expected)], more
 
 

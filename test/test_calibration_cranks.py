@@ -166,20 +166,20 @@ def tooth(angles: dict[int, float], spread: float = 0.25) -> Built:
 def test_a_crank_on_another_tooth_is_named(angle: float, teeth: int, way: str) -> None:
     built = tooth({1: angle}, 0.0)
     found = calibrate(built.platform, *built.measure(seeded(6), 60), unknowns=['zero'])
-    (mistake,) = found.assembly
+    (error,) = found.assembly
     number = 'one tooth' if abs(angle) < 20.0 else 'two teeth'
-    assert mistake.text.startswith(
+    assert error.text.startswith(
         f'the crank of leg_2 sits {number} ({abs(angle):.4g} deg of {teeth}) too {way}: its zero '
         'is ')
-    assert 'times as likely by that as by an error like those of the others' in mistake.text
+    assert 'times as likely by that as by an error like those of the others' in error.text
     assert_allclose(found.values, built.values(), atol=math.radians(0.25))
 
 
 def test_teeth_that_the_zeros_of_the_others_cannot_tell_apart_are_named_together() -> None:
     built = tooth({1: 14.4})
     measured = built.measure(seeded(6), 60)
-    (mistake,) = calibrate(built.platform, *measured, unknowns=['zero']).assembly
-    assert '(14.4 deg of 25 or 15 deg of 24' in mistake.text
+    (error,) = calibrate(built.platform, *measured, unknowns=['zero']).assembly
+    assert '(14.4 deg of 25 or 15 deg of 24' in error.text
     built = tooth({2: 15.0, 4: -14.4}, 0.0)
     found = calibrate(built.platform, *built.measure(seeded(6), 60), unknowns=['zero'])
     assert [each.text.split(' too far')[0] for each in found.assembly] == [
@@ -228,9 +228,9 @@ def with_signs(*legs: int) -> Callable[[Array, Pose], tuple[Array, Pose]]:
     (lambda q, poses: (q, inverse(poses)), 'the inverse is needed'),
     (lambda q, poses: (q, Equations(LEGS, q, poses).as_measured(poses, DEVICE)),
      'of other frames: --frames unknown')])
-def test_likely_mistakes_are_named(
+def test_possible_errors_are_named(
         change: Callable[[Array, Pose], tuple[Array, Pose]], words: str) -> None:
-    built = tooth({3: 14.4})  # a crank on another tooth does not hide another mistake
+    built = tooth({3: 14.4})  # a crank on another tooth does not hide another error
     with pytest.raises(StewartError) as caught:
         calibrate(built.platform, *change(*built.measure(seeded(6), 60)), unknowns=['zero'])
     assert words in str(caught.value) and 'nothing is calibrated' in str(caught.value)

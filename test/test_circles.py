@@ -93,20 +93,20 @@ def test_half_a_circle_and_both_are_rejected(changes: dict[str, Any], expected: 
     assert str(found.value).startswith(expected)
 
 
-def test_mistakes_in_circles_name_what_was_given() -> None:
-    def mistakes(**changes: float) -> str:
+def test_possible_errors_in_circles_name_what_was_given() -> None:
+    def errors_of(**changes: float) -> str:
         return ' '.join(StewartPlatform(ON_CIRCLES.replaced(
             {f'geometry.{name}': value for name, value in changes.items()})).check())
 
-    assert mistakes() == ''
+    assert errors_of() == ''
     # And nothing that would follow from it, as other units.
     assert StewartPlatform(ON_CIRCLES.replaced({'geometry.base_angles': [1.0] * 6})).check() == (
         'geometry.base_angles: all six are at one point: the legs hold the platform in no pose',)
-    assert 'geometry.platform_radius: 600 m from their center' in mistakes(
+    assert 'geometry.platform_radius: 600 m from their center' in errors_of(
         base_radius=900.0, platform_radius=600.0)
-    assert 'geometry.platform_radius: 0.9 m from their center, the base joints only' in mistakes(
+    assert 'geometry.platform_radius: 0.9 m from their center, the base joints only' in errors_of(
         base_radius=0.6, platform_radius=0.9)
-    assert 'geometry.platform_radius: 0.6 m from their center, the base joints 900 m' in mistakes(
+    assert 'geometry.platform_radius: 0.6 m from their center, the base joints 900 m' in errors_of(
         base_radius=900.0)
 
 

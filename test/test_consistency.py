@@ -426,23 +426,24 @@ def take(feed: messages.Feed, rows: Array, rate: float, topics: tuple[str, str, 
                 feed(topic, data)
 
 
-def mistakes(rows: Array, topics: tuple[str, str, str], **given: Any) -> list[tuple[str, str]]:
+def errors_of(rows: Array, topics: tuple[str, str, str], **given: Any) -> list[tuple[str, str]]:
     feed = messages.Feed(symmetric_parameters().replaced(
         {name.replace('__', '.'): value for name, value in given.items()}))
     take(feed, rows, 100.0, topics)
     feed.setpoints.end('')
-    return [(each.topic, each.text.split(': ')[0]) for each in feed.setpoints.mistakes(ever=True)]
+    return [(each.topic, each.text.split(': ')[0])
+            for each in feed.setpoints.possible_errors(ever=True)]
 
 
-def test_mistakes_are_those_of_the_topics() -> None:
+def test_possible_errors_are_those_of_the_topics() -> None:
     rows = stream(100.0, seconds=4.0)[1]
     setpoints, base = (POSES, TWISTS, ACCELS), (BASE_POSE, BASE_TWIST, BASE_ACCEL)
-    assert mistakes(rows, setpoints) == []
-    assert mistakes(rows, base, base__source='motion') == []
+    assert errors_of(rows, setpoints) == []
+    assert errors_of(rows, base, base__source='motion') == []
     rows[:, ACCELERATION] *= -1.0
     text = 'acceleration is not the derivative of the twists'
-    assert (ACCELS, text) in mistakes(rows, setpoints)
-    assert (BASE_ACCEL, text) in mistakes(rows, base, base__source='motion')
+    assert (ACCELS, text) in errors_of(rows, setpoints)
+    assert (BASE_ACCEL, text) in errors_of(rows, base, base__source='motion')
 
 
 def w_first(rows: Array) -> None:
@@ -462,7 +463,7 @@ def from_home_in_mm(rows: Array) -> None:
 @pytest.mark.parametrize(('mistaken', 'text'), [
     (in_mm, 'position in mm'), (w_first, 'a quaternion in the order w x y z'),
     (from_home_in_mm, 'position in mm and a pose counted from home')])
-def test_the_mistake_in_poses_is_named_before_twists_that_are_not_their_derivative(
+def test_the_possible_error_in_poses_is_named_before_twists_that_are_not_their_derivative(
         mistaken: Callable[[Array], None], text: str) -> None:
     rows = stream(100.0, seconds=4.0, tilt=0.1)[1]
     rows[:, :3] = HOME + np.array([0.05, 0.0, 0.0]) + 0.3 * (rows[:, :3] - rows[0, :3])
@@ -473,7 +474,7 @@ def test_the_mistake_in_poses_is_named_before_twists_that_are_not_their_derivati
     take(feed, rows, 100.0, (POSES, TWISTS, ACCELS))
     feed.setpoints.end('')
     for ever, which in ((True, 'first'), (False, 'last')):
-        pose, twist, *others = feed.setpoints.mistakes(ever)
+        pose, twist, *others = feed.setpoints.possible_errors(ever)
         assert (pose.topic, pose.text) == (POSES, f'{which} setpoint: possible error: {text}')
         assert 'is not the derivative of the poses' in twist.text
         assert not any('possible error' in each.text for each in (twist, *others))
@@ -482,7 +483,7 @@ def test_the_mistake_in_poses_is_named_before_twists_that_are_not_their_derivati
 def test_poses_alone_have_no_twist_to_be_wrong() -> None:
     rows = stream(100.0, seconds=4.0)[1]
     rows[:, TWIST.start:] = 0.0
-    assert mistakes(rows, (POSES, TWISTS, ACCELS), setpoint__source='pose') == []
+    assert errors_of(rows, (POSES, TWISTS, ACCELS), setpoint__source='pose') == []
 
 
 def test_gravity_in_the_acceleration_of_a_base_at_rest_is_named() -> None:
@@ -493,6 +494,6 @@ def test_gravity_in_the_acceleration_of_a_base_at_rest_is_named() -> None:
     feed = messages.Feed(symmetric_parameters().replaced({'base.source': 'motion'}))
     take(feed, rows, 100.0, (BASE_POSE, BASE_TWIST, BASE_ACCEL))
     feed.setpoints.end('')
-    one, = feed.setpoints.mistakes(ever=True)
+    one, = feed.setpoints.possible_errors(ever=True)
     assert one.topic == BASE_ACCEL
     assert one.text.endswith('possible error: gravity is in it, [0, 0, 9.81] m/s^2?')

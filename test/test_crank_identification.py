@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Identification of hexapods with cranks: from bags, of bodies by Newton and Euler, mistakes."""
+"""Identification of hexapods with cranks: from bags, of bodies by Newton and Euler, errors."""
 
 from __future__ import annotations
 
@@ -351,7 +351,7 @@ def swapped(given: Recorded) -> Recorded:
         'the zero of the angles looks wrong: another zero of the angles, (\\+1\\.\\d+ ){6}deg',
         marks=pytest.mark.slow),
 ], ids=['sign', 'kgf cm', 'degrees', 'swapped', 'zero'])
-def test_likely_mistakes_are_named_and_nothing_is_written(
+def test_possible_errors_are_named_and_nothing_is_written(
         run: Callable[..., Any], tmp_path: Path, change: Callable[[Recorded], Recorded],
         named: str) -> None:
     code, result, out, err = run('--no-report', change=change)

@@ -100,14 +100,14 @@ def test_angles_beyond_a_dead_centre_are_an_error() -> None:
 @pytest.mark.parametrize('factor, words', [
     (1e2 / 9.80665, 'kgf cm in place of N m'), (1e3, 'mN m in place of N m'),
     (-1.0, '+ must drive the angle up')])
-def test_torques_in_another_unit_are_a_likely_mistake(factor: float, words: str) -> None:
+def test_torques_in_another_unit_are_a_possible_error(factor: float, words: str) -> None:
     check, step, last = EffortCheck(RIG), ExternalWrench(RIG), None
     for each in measured(0.002 * np.arange(1500)):
         each = each._replace(efforts=six(factor * np.array(each.efforts)))
         last = step(each, last, NO_LOAD, None)
         check.add(last.stamp, each.efforts, last.differences)
-    assert check.mistake is not None
-    assert words in check.mistake.text
+    assert check.possible_error is not None
+    assert words in check.possible_error.text
 
 
 @pytest.mark.parametrize('masses', [0.0, 1.0])
@@ -236,7 +236,7 @@ def test_measured_torques_and_currents_of_motors_are_taken(file: Path, efforts: 
             BEGIN + round(1e9 * time), positions[n] - p.geometry.zero_length, rates[n], given[n],
             ), NO_LOAD, None)
     assert found is not None and found.wrench is not None and not rejected
-    assert follow.mistake is None
+    assert follow.possible_error is None
     np.testing.assert_allclose(found.wrench, LOAD, atol=0.02 * np.abs(LOAD).max())
 
 

@@ -319,12 +319,12 @@ def test_angles_in_degrees_are_named_and_the_advice_reads_them(
 
 
 @pytest.mark.parametrize('amplitude', [0.02, 0.2, 0.45, 0.8])
-def test_angles_in_radians_are_no_mistake(amplitude: float, tmp_path: Path) -> None:
+def test_angles_in_radians_are_no_possible_error(amplitude: float, tmp_path: Path) -> None:
     """Even if they exceed the limits: this hexapod reaches 0.6 rad."""
     assert not mistakes_of(write(tmp_path / 'ship.csv', ship(amplitude)), tmp_path)
 
 
-def test_the_capability_names_the_mistakes_of_the_replay(tmp_path: Path) -> None:
+def test_the_capability_names_the_possible_errors_of_the_replay(tmp_path: Path) -> None:
     path = write(tmp_path / 'ship.csv', ship(5.0))
     found = rated(path, tmp_path)
     assert found['mistakes'] == mistakes_of(path, tmp_path)

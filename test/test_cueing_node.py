@@ -23,7 +23,6 @@ from stewart_dynamics import Parameters, Pose
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.cueing.cueing_node import CueingNode
 from stewart_dynamics.cueing.motion_cueing import GRAVITY, MotionCueing
-from stewart_dynamics.cueing.vehicle import vehicle_mistake
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
@@ -311,11 +310,11 @@ def test_the_whole_lifecycle(cueing: Any) -> None:
         ((0.0, 0.0, -GRAVITY), 'gravity is along -z, must be along +z'),
         ((GRAVITY, 0.0, 0.0), 'gravity is along +x'),
         ((0.0, 0.0, 0.0), 'without gravity, set acceleration')))])
-def test_likely_mistakes_are_named(cueing: Any, force: Any, text: str) -> None:
+def test_possible_errors_are_named(cueing: Any, force: Any, text: str) -> None:
     """The platform stays at home meanwhile."""
     node = cueing(*QUICK)
     node.until(lambda: node.diagnostics and text in node.status.message,
-               'the mistake is reported', force)
+               'the error is reported', force)
     at = len(node.raw['accel'])
     node.until(lambda: np.abs(node.last[:3] - HOME.position).max() < 1e-3
                and len(node.raw['accel']) > at + 50, 'it washes out', force)
@@ -339,22 +338,6 @@ def test_bad_messages_are_rejected_and_counted(cueing: Any) -> None:
     _, rows = node.rows()
     assert np.isfinite(rows).all()
     np.testing.assert_allclose(rows[-1, :3], HOME.position, atol=1e-6)
-
-
-def test_mistakes_of_a_vehicle() -> None:
-    """None where there is no reason for one: slopes, motion, a car at rest."""
-    times = np.arange(200) / 100.0
-    rest, still = np.tile([0.0, 0.0, GRAVITY], (200, 1)), np.zeros((200, 3))
-    for force, kind in ((rest, 'specific_force'), (still, 'acceleration'), (
-            rest @ np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.3, 0.1, 0.95]]),
-            'specific_force'), (rest + np.sin(times[:, None]), 'specific_force')):
-        assert vehicle_mistake(times, force, still, kind) == ''
-    assert 'has gravity in it' in vehicle_mistake(times, rest, still, 'acceleration')
-    assert 'in degrees per second' in vehicle_mistake(
-        times, rest, still + 40.0, 'specific_force')
-    assert vehicle_mistake(times * 100.0, rest, still, 'specific_force').startswith(
-        'comes at 1 Hz')
-    assert 'in mm/s^2' in vehicle_mistake(times, 1e3 * rest, still, 'specific_force')
 
 
 def test_same_bits_as_the_library(cueing: Any) -> None:

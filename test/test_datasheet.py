@@ -38,7 +38,7 @@ from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
 from stewart_dynamics.datasheet.motion_ratings import judged, uses
 from stewart_dynamics.datasheet.pose_ratings import at_pose, AXES, KEYS, Payloads, stiffness
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
-from stewart_dynamics.mechanics.parameter_mistakes import mistakes_in_options
+from stewart_dynamics.mechanics.parameter_errors import find_option_errors
 from stewart_dynamics.replay import main as replay
 from stewart_dynamics.replay.recorded_motion import read_motion, RecordedMotion
 from stewart_dynamics.replay.replay_options import NODE, Options
@@ -475,7 +475,7 @@ def test_the_page_fits_a_phone_and_two_sheets_of_paper(sheet: Path) -> None:
         browser.close()
 
 
-def test_a_stiffness_in_another_unit_is_a_likely_mistake(snapshot: Snapshot) -> None:
+def test_a_stiffness_in_another_unit_is_a_possible_error(snapshot: Snapshot) -> None:
     assert not [*soft_legs(PARAMETERS, 5e7), *soft_legs(PARAMETERS, None)]
     (found,) = soft_legs(PARAMETERS, 50.0)
     snapshot(found)
@@ -487,8 +487,8 @@ def mistakes_in(option: str, values: Any) -> list[str]:
     if option == '--box':
         return [*doubtful_ranges(np.array(values, dtype=float), PARAMETERS)]
     if option == '--pose':
-        return [*mistakes_in_options(PARAMETERS, {option: values}, {})]
-    return [*mistakes_in_options(PARAMETERS, {}, {option: values, '--given': None})]
+        return [*find_option_errors(PARAMETERS, {option: values}, {})]
+    return [*find_option_errors(PARAMETERS, {}, {option: values, '--given': None})]
 
 
 @pytest.mark.parametrize(('option', 'values'), [
@@ -507,11 +507,11 @@ def test_units_of_poses_and_points_in_options_are_judged(
 @pytest.mark.parametrize(('option', 'values'), [
     ('--pose', (0, 0, 1.18, 0.1, 0, 0)), ('--pose', (0, 0, 1.5, 0.9, 0, 0)),
     ('--pivot', (0, 0, 2.5)), ('--payload', (1.0, 0, 1.0)), ('--box', np.full((6, 2), 0.1))])
-def test_right_units_in_options_are_no_mistakes(option: str, values: Any) -> None:
+def test_right_units_in_options_are_no_possible_errors(option: str, values: Any) -> None:
     assert mistakes_in(option, values) == []
 
 
-def test_a_likely_mistake_in_a_pose_comes_before_the_error_that_follows(
+def test_a_possible_error_in_a_pose_comes_before_the_error_that_follows(
         tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
     assert run('--params', PLATFORM, '--output', tmp_path / 'sheet', '--pose',
                0, 0, 1180, 0, 0, 0, '--pivot', 0, 0, 100) == 2

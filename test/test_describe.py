@@ -64,7 +64,7 @@ def test_each_file_is_read_into_a_parameter_file_that_the_node_takes(kind, tmp_p
     assert capsys.readouterr().err == ''
 
 
-def test_likely_mistakes_are_warnings_and_exit_code_1_with_strict(tmp_path, capsys, snapshot):
+def test_possible_errors_are_warnings_and_exit_code_1_with_strict(tmp_path, capsys, snapshot):
     p = Parameters.from_yaml(PLATFORM)
     joints = p['geometry.base_joints'].copy()
     joints[0, 1] *= -1.0

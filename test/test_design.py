@@ -171,7 +171,7 @@ def test_a_center_beyond_a_limit_is_named(snapshot: Snapshot) -> None:
         design(HEXAPOD, SMALL._replace(center=(0.0, 0.0, 2.0, 0.0, 0.0, 0.0)))
 
 
-def test_a_center_in_degrees_or_millimetres_is_a_likely_mistake(
+def test_a_center_in_degrees_or_millimetres_is_a_possible_error(
         capsys: pytest.CaptureFixture[str], tmp_path: Path, snapshot: Snapshot) -> None:
     code, _, err = run(capsys, *QUICK, '--output', tmp_path / 'out', '--center',
                        0, 0, 990, 5, 0, 0)

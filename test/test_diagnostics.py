@@ -21,7 +21,7 @@ from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.node.diagnostics.levels import ERROR, OK, STALE, Status, WARN
 from stewart_dynamics.node.diagnostics.periodic_report import DynamicsDiagnostics
 from stewart_dynamics.ros.repeated_log import RepeatedLog, SECONDS
-from stewart_dynamics.setpoints.consistency import Mistake
+from stewart_dynamics.setpoints.consistency import MessageError
 from stewart_dynamics.setpoints.input_messages import ACCEL, BASE_IMU, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, NOT_FINITE, NOT_JOINED, Rejection, STAMP_ZERO, TWICE)
@@ -327,16 +327,16 @@ def test_the_age_of_the_last_setpoint_is_stated(snapshot: Snapshot) -> None:
 
 # Singularity
 
-def test_likely_mistakes_are_a_warning_of_their_topics_as_long_as_they_are_there(
+def test_possible_errors_are_a_warning_of_their_topics_as_long_as_they_are_there(
         snapshot: Snapshot) -> None:
     parameters = PARAMETERS.replaced({'base.source': 'imu'})
     diagnostics = DynamicsDiagnostics(parameters, TOPICS, (BASE_IMU,), BEGIN)
     answered(diagnostics, BEGIN)
     diagnostics.base.heard[BASE_IMU] = BEGIN
     diagnostics.base.sampled(messages.Feed(parameters).setpoints.base, BEGIN)
-    diagnostics.mistaken([
-        Mistake(TWIST, 'velocity is not the derivative of the poses', 0, (('given', '0'),)),
-        Mistake(BASE_IMU, 'measured gravity: in g?')], BEGIN)
+    diagnostics.note_errors([
+        MessageError(TWIST, 'velocity is not the derivative of the poses', 0, (('given', '0'),)),
+        MessageError(BASE_IMU, 'measured gravity: in g?')], BEGIN)
     statuses, lines = diagnostics.report(BEGIN)
     setpoints, base = (next(each for each in statuses if each.name == name)
                        for name in ('setpoints', 'base'))
@@ -349,7 +349,7 @@ def test_likely_mistakes_are_a_warning_of_their_topics_as_long_as_they_are_there
     # Once, not with each report.
     assert line not in logged(diagnostics, BEGIN)
     answered(diagnostics, BEGIN + 2.0)
-    diagnostics.mistaken([], BEGIN + 2.0)
+    diagnostics.note_errors([], BEGIN + 2.0)
     answered(diagnostics, BEGIN + 3.5)
     assert status(diagnostics, 'setpoints', BEGIN + 3.5).level == OK
 
@@ -367,7 +367,7 @@ def test_a_clear_motion_is_ok() -> None:
     assert values['its leg'] in PARAMETERS['joints']
 
 
-def test_a_motion_that_begins_beyond_a_singularity_is_a_likely_mistake() -> None:
+def test_a_motion_that_begins_beyond_a_singularity_is_a_possible_error() -> None:
     """With z down a platform stands where it would hang: the lengths are the same."""
     around = {'limits__length_min': [1.0], 'limits__length_max': [1.4]}
     motions = HOME.motions.copy()
@@ -520,7 +520,7 @@ def test_held_limits_are_ok(snapshot: Snapshot) -> None:
 
 @pytest.mark.parametrize('action', ['warn', 'suppress_forces'])
 @pytest.mark.parametrize('limited', [False, True])
-def test_a_position_in_millimetres_is_named_as_the_likely_mistake(
+def test_a_position_in_millimetres_is_named_as_the_possible_error(
         action: str, limited: bool, snapshot: Snapshot) -> None:
     limits = {'limits__length_max': 1.4} if limited else {'limits__velocity_max': 0.5}
     high = Batch.of(HOME.stamps + 1_000_000, (0.0, 0.0, 1e3, *HOME.motions[0, 3:]))

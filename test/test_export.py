@@ -769,7 +769,7 @@ def test_bad_parameters_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixtu
                '--output', tmp_path / 'out') == 0
 
 
-def test_a_likely_mistake_is_printed_before_the_error_that_follows_from_it(
+def test_a_possible_error_is_printed_before_the_error_that_follows_from_it(
         tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
     path = tmp_path / 'mm.yaml'
     Parameters.from_yaml(PLATFORM_FILE).replaced({

@@ -503,11 +503,12 @@ def test_efforts_of_another_sign_or_unit_give_no_wrench(
     assert not noise or found[-1].wrench is not None
     first = 0 if not noise else len(found) // 4
     assert all(each.published is None for each in found[first:])
-    assert {each.mistake.what for each in found[max(first, 1):] if each.mistake} == {what}
+    assert {each.possible_error.what for each in found[max(first, 1):]
+            if each.possible_error} == {what}
 
 
 @pytest.mark.parametrize(('rate', 'noise', 'moving'), STREAMS)
-def test_loads_and_a_wrong_mass_are_no_mistake_in_the_efforts(
+def test_loads_and_a_wrong_mass_are_no_possible_error_in_the_efforts(
         rate: float, noise: float, moving: bool) -> None:
     weight, mass = 9.81 * HEXAPOD['platform.mass'], HEXAPOD['platform.mass']
     push = np.zeros((round(2.0 * rate), 6))
@@ -519,7 +520,7 @@ def test_loads_and_a_wrong_mass_are_no_mistake_in_the_efforts(
     for each in streams:
         found = judged(with_noise(each, noise=noise))
         late = found[len(found) // 8 if noise else 0:]
-        assert all(estimate.mistake is None for estimate in late)
+        assert all(estimate.possible_error is None for estimate in late)
 
 
 def moving(rate: float, noise: float = 0.0) -> list[Measurement]:
@@ -554,17 +555,18 @@ def test_velocities_that_are_not_the_derivative_of_positions_give_no_wrench(
             rate, noise)])
     last = found[-1]
     assert last.wrench is not None and last.published is None
-    assert last.mistake is not None and last.mistake.what == 'rate'
-    said = last.mistake.text
+    assert last.possible_error is not None and last.possible_error.what == 'rate'
+    said = last.possible_error.text
     assert said.startswith('velocity is not the derivative of position: ')
     for part in words.split('?: '):
         assert part in said, said
-    assert {each.mistake.what for each in found if each.mistake} <= {'rate', 'scale', 'sign'}
+    assert {each.possible_error.what for each in found if each.possible_error} <= {
+        'rate', 'scale', 'sign'}
 
 
 @pytest.mark.parametrize('noise', [0.0, 1.0])
 @pytest.mark.parametrize('rate', [1000.0, 200.0, 50.0])
-def test_right_velocities_are_no_mistake(rate: float, noise: float) -> None:
+def test_right_velocities_are_no_possible_error(rate: float, noise: float) -> None:
     found = judged(moving(rate, noise))
     assert all(each.published is not None for each in found[1:])
     # those of encoders, quantized and differences of each other, and those of a filter
@@ -573,7 +575,7 @@ def test_right_velocities_are_no_mistake(rate: float, noise: float) -> None:
     lengths = np.round(np.array([each.positions for each in steps]) / 1e-6) * 1e-6
     rates = np.diff(lengths, axis=0, prepend=lengths[:1]) * rate
     for values in (rates, np.repeat(rates[:1], late, axis=0).tolist() + rates.tolist()):
-        assert not any(each.mistake for each in judged([
+        assert not any(each.possible_error for each in judged([
             each._replace(positions=six(length), rates=six(value)) for each, length, value in zip(
                 steps, lengths, values, strict=False)]))
 
@@ -585,9 +587,10 @@ def test_stamps_of_arrival_give_no_wrench(rate: float) -> None:
     late = [each._replace(stamp=steps[min(n - n % size + size - 1, len(steps) - 1)].stamp
                           + n % size * 10_000) for n, each in enumerate(steps)]
     last = judged(late)[-1]
-    assert last.published is None and last.mistake is not None and last.mistake.what == 'stamps'
+    assert last.published is None and last.possible_error is not None
+    assert last.possible_error.what == 'stamps'
     # lost messages leave the stamps of the others right
-    assert all(each.mistake is None for each in judged([
+    assert all(each.possible_error is None for each in judged([
         each for n, each in enumerate(steps) if n % (2 * size) < size]))
 
 
@@ -597,11 +600,11 @@ def test_a_changed_mass_is_judged_anew() -> None:
     *first, last = [message_of(each) for each in stream(100.0, True, parameters=heavy)]
     for message in first:
         found = legs.use_message(message, NO_WRENCH, None)
-    assert found is not None and found.mistake is not None
-    assert found.mistake.what == 'scale' and found.published is not None
+    assert found is not None and found.possible_error is not None
+    assert found.possible_error.what == 'scale' and found.published is not None
     legs.use_parameters(heavy, ExternalWrench(heavy))
     found = legs.use_message(last, NO_WRENCH, None)
-    assert found is not None and found.mistake is None
+    assert found is not None and found.possible_error is None
 
 
 @pytest.mark.parametrize('rate', [1000.0, 500.0, 100.0])

@@ -182,10 +182,10 @@ def test_a_rejection_is_reported_and_counted(snapshot: Snapshot) -> None:
 
 
 @pytest.mark.parametrize('what', ['sign', 'scale'])
-def test_a_likely_mistake_in_the_efforts_is_a_warning_while_it_is_there(
+def test_a_possible_error_in_the_efforts_is_a_warning_while_it_is_there(
         what: str, snapshot: Snapshot) -> None:
     diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
-    mistaken = CLEAR._replace(mistake=PossibleError(what, 'all are wrong'))
+    mistaken = CLEAR._replace(possible_error=PossibleError(what, 'all are wrong'))
     felt(diagnostics, 1.0, mistaken)
     felt(diagnostics, 1.1, mistaken)
     message = 'measured_legs: possible error: all are wrong' + (
@@ -198,7 +198,7 @@ def test_a_likely_mistake_in_the_efforts_is_a_warning_while_it_is_there(
     assert level == WARN
     snapshot(text)
     # an overload may be real
-    felt(diagnostics, 1.2, OVER._replace(mistake=mistaken.mistake))
+    felt(diagnostics, 1.2, OVER._replace(possible_error=mistaken.possible_error))
     assert status(diagnostics, 1.2).level == ERROR
     snapshot(status(diagnostics, 1.2).message)
     felt(diagnostics, 3.0)

@@ -323,7 +323,7 @@ def _swapped(given: Recorded) -> Recorded:
     (lambda given: given._replace(positions=1e3 * given.positions),
      'lengths belong to no pose of this hexapod', ()),
 ], ids=['sign', 'kN', 'torque', 'swapped', 'zero length', 'mm'])
-def test_likely_mistakes_are_named_and_nothing_is_written(
+def test_possible_errors_are_named_and_nothing_is_written(
         identified: Callable[..., Any], tmp_path: Path, change: Change, named: str,
         options: tuple[str, ...]) -> None:
     code, result, out, err = identified(
@@ -443,7 +443,8 @@ def test_opposite_efforts_in_heave_are_not_taken_for_a_delay(
         assert abs(result['bags'][0]['delay_s']) < 1e-4
 
 
-def test_mistakes_may_be_accepted(identified: Callable[..., Any], snapshot: Snapshot) -> None:
+def test_possible_errors_may_be_accepted(
+        identified: Callable[..., Any], snapshot: Snapshot) -> None:
     code, result, _, err = identified(
         'rest', '--no-report', '--accept-mistakes',
         change=lambda given: given._replace(efforts=1e-3 * given.efforts))

@@ -102,7 +102,7 @@ def test_the_motion_of_the_base_is_that_of_the_readable_equations() -> None:
         assert at_rest.setpoints.base.last == (n * MS, row_of_pose(rotation, gravity))
 
 
-def test_mistakes_of_the_base_are_found_one_by_one_and_in_blocks() -> None:
+def test_possible_errors_of_the_base_are_found_one_by_one_and_in_blocks() -> None:
     given = []
     for n in range(1, 400):
         t, stamp = 0.01 * n, n * 10 * MS
@@ -111,9 +111,9 @@ def test_mistakes_of_the_base_are_found_one_by_one_and_in_blocks() -> None:
                   (BASE_ACCEL, messages.accel(stamp, frame='world'))]
     one, many = Feed(base='motion'), Feed(base='motion')
     assert messages.check_many(one, many, given, TOPICS, [100, 500]) == 0
-    found = one.setpoints.mistakes(ever=True)
+    found = one.setpoints.possible_errors(ever=True)
     assert BASE_TWIST in {each.topic for each in found}
-    assert many.setpoints.mistakes(ever=True) == found
+    assert many.setpoints.possible_errors(ever=True) == found
 
 
 @given(st.lists(st.tuples(st.integers(-400, 40), st.floats(-0.3, 0.3), st.booleans()),

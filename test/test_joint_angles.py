@@ -20,7 +20,7 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
 from stewart_dynamics.mechanics.kinematics.joint_axes import AXES, BASE_AXES, PLATFORM_AXES
 from stewart_dynamics.mechanics.limits import BASE_ANGLE_MAX, OF_JOINTS, PLATFORM_ANGLE_MAX
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 from stewart_dynamics.planned.checks import LIMIT
 from stewart_dynamics.planned.planned_trajectory import check_planned_trajectory
 from stewart_dynamics.setpoints.step import Batch, Step
@@ -147,10 +147,10 @@ def test_a_limit_needs_axes_or_a_home_pose(snapshot: Snapshot) -> None:
     {PLATFORM_AXES: [0.0, 0.0, -1.0] * 6},
     {BASE_AXES: [0.0, 0.0, 1.0] * 6, BASE_ANGLE_MAX: 0.3},
 ])
-def test_likely_mistakes_are_found(changes: dict[str, Any], snapshot: Snapshot) -> None:
-    assert likely_mistakes(SYMMETRIC) == ()
-    mistake, = likely_mistakes(SYMMETRIC.replaced(changes))
-    snapshot(mistake)
+def test_possible_errors_are_found(changes: dict[str, Any], snapshot: Snapshot) -> None:
+    assert find_parameter_errors(SYMMETRIC) == ()
+    error, = find_parameter_errors(SYMMETRIC.replaced(changes))
+    snapshot(error)
 
 
 # Where they are checked

@@ -84,7 +84,7 @@ def test_names_may_be_nested_or_dotted(text: str) -> None:
     ('limits:', 'None'), ('limits: {force_max: }', 'None'), ('limits: {force_max: []}', '[]'),
     ('platform_side: up', 'platform_side'), ('geometry: {platform_side: up}', "'up'"),
     ('legs: {crank: {length: -0.1}}', '-0.1'), ('joints: leg', "'leg'")])
-def test_a_mistake_is_named(text: str, named: str) -> None:
+def test_a_possible_error_is_named(text: str, named: str) -> None:
     assert any(named in error for error in errors(text))
 
 

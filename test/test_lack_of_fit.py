@@ -196,7 +196,7 @@ def test_stribeck_friction_is_named_behind_a_piece_at_rest() -> None:
         assert lack.cause == 'stribeck_friction'
 
 
-def test_mistakes_in_short_recordings_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_possible_errors_in_short_recordings_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wrong_models, 'SECONDS', 5.0)
     bags = simulated(Case(true_hexapod(1)), 1)
     found = identify([each._replace(positions=each.positions - 0.02) for each in bags])
@@ -236,7 +236,7 @@ def test_delays_of_the_efforts_up_to_a_tenth_of_a_second_are_found(
 
 
 @pytest.mark.parametrize(('delay', 'word'), [(0.13, 'later'), (-0.13, 'earlier')])
-def test_longer_delays_are_a_likely_mistake(
+def test_longer_delays_are_a_possible_error(
         delay: float, word: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wrong_models, 'NOISE', NOISE._replace(delay=delay))
     likely = identify(simulated(Case(true_hexapod(2)), 2)).likely
@@ -324,7 +324,7 @@ def test_rates_inside_the_coulomb_friction_band_are_reported(velocity: float, sa
                for each in bag.notices) == said
 
 
-def test_a_platform_of_a_tenth_of_its_mass_is_no_mistake() -> None:
+def test_a_platform_of_a_tenth_of_its_mass_is_no_possible_error() -> None:
     # Its delay must not be found by efforts of another unit.
     truth = drawn(122)
     assert truth.parameters['platform.mass'] < 0.11 * GIVEN['platform.mass']
@@ -357,8 +357,8 @@ def test_hexapods_of_all_sizes_have_similar_results(
     assert shown.split()[1].startswith('1.4')
     assert shown.split()[1].endswith({1e-3: 'e-14', 1e3: 'e+16'}[size])
     wrong = [each._replace(positions=each.positions - 0.02) for each in bags]
-    (mistake,) = identify(wrong, size=size).likely
-    assert mistake.what == 'zero_length'
+    (error,) = identify(wrong, size=size).likely
+    assert error.what == 'zero_length'
 
 
 def below(up: MotionAt) -> MotionAt:
@@ -464,7 +464,7 @@ def test_exact_recordings_of_the_simulator_have_intervals(seed: int) -> None:
     assert all(each.holds and each.identified for each in outcome.intervals)
 
 
-def test_a_mistake_that_was_accepted_leaves_no_intervals() -> None:
+def test_a_possible_error_that_was_accepted_leaves_no_intervals() -> None:
     """Nothing can be said of the values where the recording is another one than the model's."""
     truth = drawn(3)
     bag = estimate_cases.recorded(truth, 'rich', 3)

@@ -108,7 +108,7 @@ def values_of(case: Case, measured: Array) -> dict[str, Any]:
     return found
 
 
-def test_stamps_of_arrival_are_a_mistake() -> None:
+def test_stamps_of_arrival_are_a_possible_error() -> None:
     case = case_of()
     forces, stamps = case.forces(), case.setpoints.stamps
     n = np.arange(len(stamps))
@@ -116,7 +116,7 @@ def test_stamps_of_arrival_are_a_mistake() -> None:
     for times, expected in ((stamps, 0), (bursts, 1)):
         comparison = Comparison(case.parameters)
         compared(comparison, case, (times, forces))
-        assert len(comparison.stamps.mistakes(True, ['measured'])) == expected
+        assert len(comparison.stamps.possible_errors(True, ['measured'])) == expected
 
 
 # The residual and the external wrench
@@ -256,7 +256,7 @@ def test_torques_of_self_locking_screws_are_rejected(snapshot: Snapshot) -> None
 @pytest.mark.parametrize(('factor', 'what', 'words'), [
     (-1.0, 'sign', 'the efforts have the opposite sign'), (1e-3, 'unit', 'kN in place of N'),
     (0.0, 'zero', 'all efforts are zero'), (3.0, 'scale', 'or a wrong platform.mass')])
-def test_a_likely_mistake_in_the_efforts_is_named(factor: float, what: str, words: str) -> None:
+def test_a_possible_error_in_the_efforts_is_named(factor: float, what: str, words: str) -> None:
     case = case_of()
     right = values_of(case, case.forces())
     assert right['likely_mistake'] is None and right['external_wrench_given']
@@ -293,7 +293,7 @@ def test_the_efforts_of_single_legs_are_judged(seed: int) -> None:
 
 
 @pytest.mark.parametrize('seed', range(12))
-def test_loads_friction_and_a_wrong_mass_are_no_mistake_in_the_efforts(seed: int) -> None:
+def test_loads_friction_and_a_wrong_mass_are_no_possible_error_in_the_efforts(seed: int) -> None:
     case, random = case_of(seed), rng(seed)
     p = case.parameters
     size, weight = size_of(p), 9.81 * p['platform.mass']

@@ -27,17 +27,17 @@ def feed_of(source: str, **given: Any) -> messages.Feed:
         'base.source': source, **{k.replace('__', '.'): v for k, v in given.items()}}))
 
 
-def mistakes(feed: messages.Feed) -> list[str]:
-    return [each.words for each in feed.setpoints.mistakes(ever=True)]
+def errors_of(feed: messages.Feed) -> list[str]:
+    return [each.words for each in feed.setpoints.possible_errors(ever=True)]
 
 
 def imu(force: Array, spin: Array | None = None, **given: Any) -> list[str]:
-    """Return the mistakes in readings of an IMU (N, 3) at 100 Hz."""
+    """Return the errors in readings of an IMU (N, 3) at 100 Hz."""
     feed = feed_of('imu', **given)
     spin = np.zeros(force.shape) if spin is None else spin
     for n, (f, w) in enumerate(zip(force.tolist(), spin.tolist(), strict=True)):
         feed(BASE_IMU, messages.imu(messages.NOW + round(n / RATE * 1e9), w, f))
-    return mistakes(feed)
+    return errors_of(feed)
 
 
 def still(up: float, seconds: float = 3.0) -> Array:
@@ -48,7 +48,7 @@ def still(up: float, seconds: float = 3.0) -> Array:
     (0.0, '0 m/s^2: removed by the driver?'), (1.0, '1 m/s^2: in g?'),
     (-G, '[0, 0, 9.81] m/s^2 pulls the platform away from the base: a sign? '
          'base.imu.orientation?')])
-def test_the_likely_mistake_in_a_specific_force_is_named(up: float, expected: str) -> None:
+def test_the_possible_error_in_a_specific_force_is_named(up: float, expected: str) -> None:
     noise = rng(1).normal(0.0, 0.02, (300, 3))
     for force in (still(up), still(up) + noise):
         one, = imu(force)
@@ -56,7 +56,7 @@ def test_the_likely_mistake_in_a_specific_force_is_named(up: float, expected: st
         assert expected.split('] ')[-1].split('m/s^2')[-1] in one
 
 
-def test_right_readings_have_no_mistake() -> None:
+def test_right_readings_have_no_possible_error() -> None:
     random, times = rng(2), np.arange(2000) / RATE
     noise = random.normal(0.0, 0.3, (2000, 3))
     assert imu(still(G, 20.0) + noise) == []
@@ -76,7 +76,7 @@ def test_right_readings_have_no_mistake() -> None:
     assert imu(still(G, 20.0) + [3.0, 2.0, 0.0], turning) == []
 
 
-def test_half_a_second_of_free_fall_is_no_mistake() -> None:
+def test_half_a_second_of_free_fall_is_no_possible_error() -> None:
     force = still(G, 5.0)
     force[200:250] = 0.0
     assert imu(force) == []
@@ -96,15 +96,15 @@ def test_the_orientation_of_the_imu_is_used() -> None:
     assert len(imu(still(G), base__imu__orientation=over)) == 1
 
 
-def test_a_hexapod_that_hangs_is_no_mistake() -> None:
+def test_a_hexapod_that_hangs_is_no_possible_error() -> None:
     assert imu(still(-G), geometry__platform_side='positive') == []
 
 
 @pytest.mark.parametrize('turn', [0.0, 0.4, math.pi])
-def test_a_base_turned_over_is_a_likely_mistake(turn: float) -> None:
+def test_a_base_turned_over_is_a_possible_error(turn: float) -> None:
     feed = feed_of('pose')
     x, y, z, w = to_quaternion(rotation_about([1.0, 0.0, 0.0], turn)).tolist()
     for n in range(300):
         feed(BASE_POSE, messages.pose(
             messages.NOW + round(n / RATE * 1e9), (0.0, 0.0, 0.0), (x, y, z, w), 'world'))
-    assert len(mistakes(feed)) == (turn > 3.0)
+    assert len(errors_of(feed)) == (turn > 3.0)

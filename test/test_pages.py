@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 import snapshot
 import stewart_dynamics
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 from stewart_dynamics.parameters.table import PARAMETERS
 from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
@@ -243,7 +243,7 @@ def test_the_programs_on_the_page_print_what_it_says(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize(('file', 'node', 'source'), FILES)
-def test_the_files_describe_hexapods_without_likely_mistakes(
+def test_the_files_describe_hexapods_without_possible_errors(
         file: str, node: str, source: str) -> None:
     platform = hexapod(file, node)
     assert platform.parameters['base.source'] == source
@@ -330,7 +330,7 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 def test_the_file_on_the_page_is_the_hexapod_that_is_computed(names: dict[str, Any]) -> None:
     assert names['platform'].parameters == names['parameters']
-    assert likely_mistakes(names['parameters']) == ()
+    assert find_parameter_errors(names['parameters']) == ()
 
 
 def test_the_node_gives_the_forces_on_the_page(

@@ -282,7 +282,7 @@ def test_a_pose_out_of_reach_between_two_points_is_named() -> None:
                      r'reach: [\d.]+ mm missing$', result.message)
 
 
-def test_a_point_out_of_reach_is_named_with_its_likely_mistake() -> None:
+def test_a_point_out_of_reach_is_named_with_its_possible_error() -> None:
     times, motion = lifted(0.1)
     rows = motion.rows.copy()
     rows[:, POSITION] *= 1e3

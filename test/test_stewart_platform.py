@@ -24,7 +24,7 @@ from stewart_dynamics import (
     ParameterError, Parameters, Pose, SingularityError, StewartError, StewartPlatform)
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.dynamics.regressor import Regressor
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 
 Array = NDArray[np.float64]
 
@@ -233,11 +233,11 @@ def test_an_unknown_home_is_an_error(changes: dict[str, Any], snapshot: Snapshot
         StewartPlatform(EXAMPLE.replaced(changes, 'a.yaml')).home_pose()
 
 
-def test_check_returns_the_likely_mistakes(snapshot: Snapshot) -> None:
+def test_check_returns_the_possible_errors(snapshot: Snapshot) -> None:
     assert ON_EXAMPLE.check() == ()
     wrong = EXAMPLE.replaced({'gravity': [0.0, 0.0, -9806.65]})
     found = StewartPlatform(wrong).check()
-    assert found == likely_mistakes(wrong)
+    assert found == find_parameter_errors(wrong)
     assert len(found) == 1
     snapshot(found[0])
 

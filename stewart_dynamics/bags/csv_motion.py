@@ -19,7 +19,7 @@ from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
 from stewart_dynamics.bags.baseline import gap_of, integrated
 from stewart_dynamics.errors import BagError, shown_name
 from stewart_dynamics.mechanics.frames.motion import Pose
-from stewart_dynamics.mechanics.kinematics.pose_mistakes import Angles, PoseByAngles
+from stewart_dynamics.mechanics.kinematics.pose_errors import Angles, PoseByAngles
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.setpoint import StampedWriter

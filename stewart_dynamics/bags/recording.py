@@ -18,7 +18,7 @@ from stewart_dynamics.bags.mcap_file import MAGIC, McapFile
 from stewart_dynamics.bags.other_messages import Converter, POSE_TYPES
 from stewart_dynamics.bags.sqlite_file import SqliteFile
 from stewart_dynamics.errors import BagError, one_line, shown_name
-from stewart_dynamics.mechanics.kinematics.pose_mistakes import PoseByAngles
+from stewart_dynamics.mechanics.kinematics.pose_errors import PoseByAngles
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import PARAMETERS

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.calibration.assembly_errors import assembly_errors, TURN
-from stewart_dynamics.calibration.calibration_mistakes import (
-    CalibratedFit, Measured, mistakes_of_input, not_identified, RESULT_ERRORS)
+from stewart_dynamics.calibration.calibration_errors import (
+    CalibratedFit, find_input_errors, Measured, not_identified, RESULT_ERRORS)
 from stewart_dynamics.calibration.equations import (
     chosen, DEVICE, Equations, Frames, GEOMETRY, GUIDED, held_by_groups, SAME, values_of,
     with_geometry)
@@ -153,12 +153,12 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         ``lengths`` are positions of drives whose screws turn with their legs: motor angles times
         lead / (2 pi gear_ratio).
     accept_mistakes : bool
-        Return a result although a mistake is likely or held-out poses are predicted worse.
+        Return a result although a possible error is found or held-out poses are predicted worse.
 
     Raises
     ------
     StewartError
-        The poses do not support a calibration, or a mistake is likely.
+        The poses do not support a calibration, or a possible error is found.
 
     """
     p = platform.parameters
@@ -176,13 +176,13 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         raise ParameterError('fixed: nothing is left to be calibrated')
     likely: list[PossibleError] = []
 
-    def refuse(mistakes: Iterable[PossibleError]) -> None:
-        likely.extend(mistakes)
+    def refuse(found_errors: Iterable[PossibleError]) -> None:
+        likely.extend(found_errors)
         if likely and not accept_mistakes:
             raise StewartError(
                 f'{likely[0].text}; nothing is calibrated (--accept-mistakes does)')
 
-    refuse(mistakes_of_input(Measured(p, measured, unknown, angles, degrees, millimeters)))
+    refuse(find_input_errors(Measured(p, measured, unknown, angles, degrees, millimeters)))
     known = find_frames(p, measured) if unknown else SAME
     measured = measured._replace(frames=known)
     size = p.singularity.characteristic_length

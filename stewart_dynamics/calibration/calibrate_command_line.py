@@ -104,7 +104,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.calibration.one_run import CalibrationOptions, run
     from stewart_dynamics.calibration.recorded_poses import read_bag
     from stewart_dynamics.calibration.tracked_poses import read_tracked
-    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.tables.reading import is_table
 
@@ -131,10 +131,9 @@ def _run(given: argparse.Namespace) -> int:
     else:
         measured = read_poses(given.poses, parameters, millimeters, given.degrees,
                               Reading.given(given))
-    _PROGRAM.prepare(likely_mistakes(parameters))
+    _PROGRAM.prepare(find_parameter_errors(parameters))
     result = run(measured, str(given.poses), parameters, output, options)
-    for each in result['likely_mistakes']:
-        _PROGRAM.complain(f'warning: {each["text"]}')
+    _PROGRAM.warn(each['text'] for each in result['likely_mistakes'])
     _PROGRAM.say(result_text(result))
     return _PROGRAM.end(
         output, {given.poses: missing}, given.strict and not is_complete(result))

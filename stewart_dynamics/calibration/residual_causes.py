@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.calibration.calibration_mistakes import DEVICE_SCALE, LEG_SCALE
+from stewart_dynamics.calibration.calibration_errors import DEVICE_SCALE, LEG_SCALE
 from stewart_dynamics.calibration.equations import Equations, GEOMETRY, PLATFORM
 from stewart_dynamics.calibration.geometry_fit import Fit, Unknowns
 from stewart_dynamics.calibration.noise import covariances, whitening

@@ -212,7 +212,7 @@ class CueingNode(ManagedNode[CueingParameters]):
     def _advance(self, stream: CueingStream) -> None:
         """Advance the cueing to the next setpoint."""
         vehicle, gravity = self._vehicle, float(self._cueing.at_rest[2])
-        heard = (vehicle.reading is not None and not vehicle.mistake
+        heard = (vehicle.reading is not None and not vehicle.possible_error
                  and vehicle.silent(self._now / SECOND) < self._settings.vehicle_timeout)
         change = 1.0 / (_FADE * self._settings.cueing.rate)
         share = min(max(self._presence + (change if heard else -change), 0.0), 1.0)
@@ -243,10 +243,10 @@ class CueingNode(ManagedNode[CueingParameters]):
         self._log.write_last(now)
         if not self._active:
             return
-        mistake = self._vehicle.mistake
+        before = self._vehicle.possible_error
         self._vehicle.check(self._now / SECOND)
-        if self._vehicle.mistake and self._vehicle.mistake != mistake:
-            self._log.write([LogLine(WARN, f'vehicle: {self._vehicle.mistake}', 'mistake')])
+        if (error := self._vehicle.possible_error) and error != before:
+            self._log.write([LogLine(WARN, f'vehicle: {error}', 'possible error')])
         if not (self._periods.begun or self._no_approach) and (
                 now - self._activated > self._settings.start_timeout):
             if self._now:
@@ -276,8 +276,8 @@ class CueingNode(ManagedNode[CueingParameters]):
             level, message = WARN, f'waits for {"~/measured_legs" if self._now else "/clock"}'
         elif self._due < len(self._approach):
             message = 'approaches the home pose'
-        elif self._vehicle.mistake:
-            level, message = ERROR, f'vehicle: {self._vehicle.mistake}'
+        elif self._vehicle.possible_error:
+            level, message = ERROR, f'vehicle: {self._vehicle.possible_error}'
         elif silent > self._settings.vehicle_timeout:
             level, message = WARN, 'no ~/vehicle: ' + (
                 'never heard' if math.isinf(silent)

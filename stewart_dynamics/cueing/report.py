@@ -178,7 +178,7 @@ def _with(parameters: Parameters, gains: Array) -> Parameters:
     return parameters.replaced(values)
 
 
-def cueing_result(path: Path, mistake: str | None, cueing: MotionCueing,
+def cueing_result(path: Path, possible_error: str | None, cueing: MotionCueing,
                   vehicle: RecordedVehicle, found: Cued, used: Mapping[str, Array],
                   gains: list[Gain]) -> CueingResult:
     """Return the content of cueing.json."""
@@ -186,7 +186,7 @@ def cueing_result(path: Path, mistake: str | None, cueing: MotionCueing,
     turning = found.motion.angular_velocity
     duration = float(vehicle.times[-1])
     return CueingResult(
-        software=SOFTWARE, date=now(), vehicle=str(path), likely_mistake=mistake,
+        software=SOFTWARE, date=now(), vehicle=str(path), likely_mistake=possible_error,
         duration_s=duration, samples=len(vehicle.times), notices=list(vehicle.notices),
         travel_m={axis: [float(each.min()), float(each.max())]
                   for axis, each in zip('xyz', away.T, strict=True)},

@@ -64,8 +64,8 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.cueing.motion_cueing import MotionCueing
     from stewart_dynamics.cueing.recorded_vehicle import read_vehicle
     from stewart_dynamics.cueing.report_page import write_page
-    from stewart_dynamics.cueing.vehicle import vehicle_mistake
-    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+    from stewart_dynamics.cueing.vehicle import find_vehicle_error
+    from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.reporting.results_folder import (
         check_free, CUEING, CUEING_PARAMETERS, MOTION_BAG, remove_abandoned, REPORT_PAGE,
@@ -78,21 +78,20 @@ def _run(given: argparse.Namespace) -> int:
     remove_abandoned([given.output])
     parameters = Parameters.from_yaml(given.params, given.node)
     vehicle = read_vehicle(given.vehicle, given.topic, Reading.given(given))
-    _PROGRAM.prepare(likely_mistakes(parameters))
-    mistake = vehicle_mistake(vehicle.times, vehicle.forces, vehicle.rates,
-                              parameters.cueing.input)
-    for text in (*vehicle.notices, *([f'vehicle: {mistake}'] if mistake else ())):
-        _PROGRAM.complain(f'warning: {text}')
+    _PROGRAM.prepare(find_parameter_errors(parameters))
+    error = find_vehicle_error(
+        vehicle.times, vehicle.forces, vehicle.rates, parameters.cueing.input)
+    _PROGRAM.warn([*vehicle.notices, *([f'vehicle: {error}'] if error else ())])
     gains: list[Gain] = []
     chosen = parameters
-    if given.tune and mistake:
+    if given.tune and error:
         _PROGRAM.complain('warning: no gains are proposed from such a recording')
     elif given.tune:
         chosen, gains = report.tuned(parameters, vehicle)
     cueing = MotionCueing(chosen)
     found = report.cued(cueing, vehicle)
     used = report.used_limits(chosen, vehicle.times, found.motion)
-    result = report.cueing_result(given.vehicle, mistake, cueing, vehicle, found, used, gains)
+    result = report.cueing_result(given.vehicle, error, cueing, vehicle, found, used, gains)
     with whole_folder(given.output, options, CUEING, before) as partial:
         write_json(partial / CUEING, result)
         write_setpoint_bag(partial / MOTION_BAG, vehicle.times, found.motion,
@@ -104,7 +103,7 @@ def _run(given: argparse.Namespace) -> int:
     _PROGRAM.say(_text(result))
     held = bool(result.held_back_s)
     code = _PROGRAM.end(given.output, {given.vehicle: vehicle.missing}, given.strict and (
-        held or bool(mistake)))
+        held or bool(error)))
     assert code in (DONE, 1, PARTLY_READ)
     return code
 

@@ -50,7 +50,7 @@ _GRAVITY = 9.80665
 _HALF, _FREE, _LARGEST_FORCE = 5.0, 0.5, 100.0  # [m/s^2]
 
 
-def vehicle_mistake(times: Array, forces: Array, rates: Array, kind: str) -> str:
+def find_vehicle_error(times: Array, forces: Array, rates: Array, kind: str) -> str:
     """
     Return the possible error in the motion of a vehicle, empty without one.
 
@@ -191,13 +191,13 @@ class Vehicle:
 
     reading (6,): last specific force [m/s^2] and angular velocity [rad/s].
     heard: time of the last one, by the clock of ``use_message`` [s].
-    mistake: the possible error in them.
+    possible_error: the possible error in them.
     """
 
     def __init__(self, parameters: Parameters, rejections: Rejections, notice: Any) -> None:
         self.reading: Sequence[float] | None = None
         self.heard = -math.inf
-        self.mistake = ''
+        self.possible_error = ''
         self._reader = SampleReader(VEHICLE, None, rejections)
         self._rejections = rejections
         self._notice = notice
@@ -255,7 +255,7 @@ class Vehicle:
         if len(recent) < 2 or recent[-1] - recent[0] < 0.4 * _WINDOW:
             return
         if self.rate < _LEAST_RATE:
-            self.mistake = _too_slow(self.rate)
+            self.possible_error = _too_slow(self.rate)
             return
         blocks = np.array(self._blocks)
         if len(blocks) < _LEAST_RESTING:
@@ -266,11 +266,11 @@ class Vehicle:
             # At rest and right: readings before are another drive.
             while len(self._blocks) > _REST_BLOCKS:
                 self._blocks.popleft()
-        elif not found and (len(blocks) >= _LEAST_BLOCKS or not self.mistake):
+        elif not found and (len(blocks) >= _LEAST_BLOCKS or not self.possible_error):
             found = _error_in(blocks, self.kind)
         elif not found:
-            found = self.mistake
-        self.mistake = found
+            found = self.possible_error
+        self.possible_error = found
 
     def _in_order(self, stamp: int) -> bool:
         """Return whether a reading is used; without a stamp it is used as it comes."""

@@ -33,7 +33,7 @@ def _arguments() -> argparse.ArgumentParser:
                     'what limits it.',
         files='DIR/ gets datasheet.html, datasheet.json and workspace.csv.')
     add_parameters(parser, '; with the limits that rate it')
-    # Wide enough for mm, whose mistake is named.
+    # Wide enough for mm, whose possible error is named.
     size = between(-1e6, 1e6)
     parser.add_argument('--pose', nargs=6, type=size, metavar=(
         'X', 'Y', 'Z', 'ALPHA', 'BETA', 'GAMMA'),
@@ -85,7 +85,8 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.datasheet.datasheet_text import sheet_text
     from stewart_dynamics.datasheet.rated_hexapod import Payload
     from stewart_dynamics.mechanics.frames.motion import Pose
-    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes, mistakes_in_options
+    from stewart_dynamics.mechanics.parameter_errors import (
+        find_option_errors, find_parameter_errors)
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.reporting.results_folder import (
         check_free, DATASHEET, remove_abandoned)
@@ -109,9 +110,9 @@ def _run(given: argparse.Namespace) -> int:
     check_free(given.output, options, DATASHEET)
     remove_abandoned([given.output])
     _PROGRAM.prepare((
-        *likely_mistakes(parameters), *soft_legs(parameters, order.leg_stiffness),
+        *find_parameter_errors(parameters), *soft_legs(parameters, order.leg_stiffness),
         *(() if order.box is None else doubtful_ranges(order.box, parameters)),
-        *mistakes_in_options(parameters, {'--pose': given.pose}, {
+        *find_option_errors(parameters, {'--pose': given.pose}, {
             '--pivot': given.pivot, '--payload': given.payload and given.payload[1:]})))
     size = 0 if given.motion is None else bytes_of(given.motion)
     # Each stage counts as a part of the bag, whose reading is the longest where it is large.

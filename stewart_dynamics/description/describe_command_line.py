@@ -141,9 +141,8 @@ def _read(given: argparse.Namespace, files: FilesOfFolder) -> int:
 def _judge(parameters: Parameters, given: argparse.Namespace, warnings: tuple[str, ...] = (),
            ) -> int:
     """Print warnings and possible errors and return the exit code."""
-    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 
-    mistakes = warnings + likely_mistakes(parameters)
-    for mistake in mistakes:
-        _PROGRAM.complain(f'warning: {mistake}')
-    return STRICT if mistakes and given.strict else DONE
+    errors = warnings + find_parameter_errors(parameters)
+    _PROGRAM.warn(errors)
+    return STRICT if errors and given.strict else DONE

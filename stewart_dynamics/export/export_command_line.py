@@ -63,14 +63,13 @@ def _export(given: argparse.Namespace, files_of_folder: FilesOfFolder) -> int:
     from stewart_dynamics.export.drive_files import drive_files
     from stewart_dynamics.export.fmu import find_compiler, fmu, has_binaries
     from stewart_dynamics.export.linuxcnc import hal_lines
-    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
     name = check_name(given.name)
     parameters = Parameters.from_yaml(given.params, given.node)
-    for mistake in likely_mistakes(parameters):
-        _PROGRAM.complain(f'warning: {mistake}')
+    _PROGRAM.warn(find_parameter_errors(parameters))
     files: dict[str, str | bytes] = {**c_project(parameters, name)}
     if given.fmu:
         compiler = find_compiler() if has_binaries(given.fmu) else None

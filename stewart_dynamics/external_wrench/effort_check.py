@@ -36,7 +36,7 @@ class EffortCheck:
         self._right = 0
         self._begin()
         self._shortest = 1
-        self.mistake: PossibleError | None = None
+        self.possible_error: PossibleError | None = None
         """The possible error; None without one."""
 
     def _begin(self) -> None:
@@ -72,7 +72,7 @@ class EffortCheck:
         for sums in (block, self._sums):
             sums.add(measured, measured - differences, weight=self._count)
         self._right += block.alike
-        self.mistake = None if self._right >= _RIGHT else self._sums.mistake()
+        self.possible_error = None if self._right >= _RIGHT else self._sums.find_error()
         self._begin()
 
 

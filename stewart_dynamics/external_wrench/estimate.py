@@ -98,12 +98,12 @@ class Estimate(NamedTuple):
     """Measured - model efforts, not filtered (6); none of the first measurement."""
     base: tuple[float, ...] = NO_BASE  # a row of the base's motion; of nan: it is still
     overloads: tuple[Overload, ...] = ()
-    mistake: PossibleError | None = None  # possible error in the measurements
+    possible_error: PossibleError | None = None  # possible error in the measurements
 
     @property
     def published(self) -> Six | None:
-        """Return the wrench; None without one, or where it likely is that of a mistake."""
-        return self.wrench if leaves_wrench(self.mistake) else None
+        """Return the wrench; None without one, or where it likely is that of an error."""
+        return self.wrench if leaves_wrench(self.possible_error) else None
 
     @property
     def force(self) -> float:

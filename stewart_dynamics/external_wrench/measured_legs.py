@@ -167,17 +167,17 @@ class MeasuredLegs:
         return self._last.motion if self._last else None
 
     @property
-    def mistake(self) -> PossibleError | None:
+    def possible_error(self) -> PossibleError | None:
         """Possible error in stamps, velocities or efforts: the former may look like the latter."""
         if self._stamps.present is not None:
             return PossibleError(STAMPS, self._stamps.present[0])
-        return self._rates.mistake or self._efforts.mistake
+        return self._rates.possible_error or self._efforts.possible_error
 
     def use_parameters(self, parameters: Parameters, step: ExternalWrench) -> None:
         """Use changed parameters from now on."""
         self._step, self._of_motors = step, EffortsOfMotors(parameters)
-        if self._efforts.mistake is not None:
-            self._efforts = EffortCheck(parameters)  # they may have been the mistake
+        if self._efforts.possible_error is not None:
+            self._efforts = EffortCheck(parameters)  # they may have been the error
 
     def use_message(self, data: bytes, known: Six, target: Target | None,
                     base: BaseInput | None = None) -> Estimate | None:
@@ -212,8 +212,8 @@ class MeasuredLegs:
         self._efforts.add(last.stamp, measurement.efforts, last.differences)
         self._rates.add(measurement, last)
         self._stamps.add_readings([last.stamp], [measurement.positions])
-        mistake = self.mistake
-        self._last = last if mistake is None else last._replace(mistake=mistake)
+        error = self.possible_error
+        self._last = last if error is None else last._replace(possible_error=error)
         if self._history is not None:
             self._history.add_measurement(measurement.efforts, self._last, known)
         return self._last

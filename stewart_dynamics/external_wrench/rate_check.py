@@ -37,7 +37,7 @@ class RateCheck:
         self._joints, self._unit = parameters.joints, parameters.leg_kind.rate.unit
         self._consistency = Consistency(parameters.singularity.characteristic_length, None)
         self._recent: deque[Measurement] = deque(maxlen=_RECENT)
-        self.mistake: PossibleError | None = None
+        self.possible_error: PossibleError | None = None
         """The possible error; None without one."""
 
     def add(self, measurement: Measurement, estimate: Estimate) -> None:
@@ -50,11 +50,11 @@ class RateCheck:
         self._consistency.judge()
         found = self._consistency.present
         if not found:
-            self.mistake = None
-        elif self.mistake is None:
+            self.possible_error = None
+        elif self.possible_error is None:
             reasons = [each.reason for each in found.values()]
             late = next((each for each in reasons if each.endswith(('late?', 'early?'))), '')
-            self.mistake = PossibleError(RATE, _words(
+            self.possible_error = PossibleError(RATE, _words(
                 list(self._recent), self._joints, late, self._unit))
 
 

@@ -26,7 +26,7 @@ class IdentificationOptions(NamedTuple):
     cutoff: float = CUTOFF  # cut-off frequency of the filter on regressor and efforts [Hz]
     hold_out: float = HOLD_OUT  # fraction at the end of each bag that validates a fit to the rest
     delay: bool = True  # estimate the delay of the efforts
-    accept_mistakes: bool = False  # write results although a mistake is likely
+    accept_mistakes: bool = False  # write results although a possible error is found
     report: bool = True  # write report.html
     force: bool = False  # replace existing results
     run: str = ''

@@ -68,7 +68,7 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
     Identify from bags into a folder; return the content of identification.json.
 
     ``warn`` is called with possible errors that were accepted. Raises StewartError if a bag cannot
-    be used, or a mistake is likely: nothing is written.
+    be used, or a possible error is found: nothing is written.
     """
     before = check_free(folder, options, IDENTIFICATION)
     remove_abandoned([folder])

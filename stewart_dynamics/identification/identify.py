@@ -32,7 +32,7 @@ from stewart_dynamics.identification.lack_of_fit import (
 from stewart_dynamics.identification.parameter_fit import (
     best_for_file, Fit, fit, Noisy, residual_of)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
-from stewart_dynamics.identification.recording_mistakes import (
+from stewart_dynamics.identification.recording_errors import (
     Comparison, LONGEST_LAG, most_motion, of_efforts, of_fit, of_no_pose, of_validation)
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.window_poses import first_pose

@@ -120,20 +120,20 @@ def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import find_bags
     from stewart_dynamics.identification.identification_results import result_text, run
-    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes, mistakes_in_options
+    from stewart_dynamics.mechanics.parameter_errors import (
+        find_option_errors, find_parameter_errors)
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
     options = IdentificationOptions(**arguments_of(given, IdentificationOptions._fields))
     parameters = Parameters.from_yaml(given.params, given.node)
     if given.design:
-        for mistake in mistakes_in_options(parameters, {'--center': given.center}, {}):
-            _PROGRAM.complain(f'warning: {mistake}')
+        _PROGRAM.warn(find_option_errors(parameters, {'--center': given.center}, {}))
         _design(given, parameters)
         return DONE
     output = given.output or Path(IDENTIFIED)
     bags = [bag for path in given.bags for bag in find_bags(path, output)]
-    _PROGRAM.prepare(likely_mistakes(parameters))
+    _PROGRAM.prepare(find_parameter_errors(parameters))
     result = run(bags, parameters, output, options, _PROGRAM.complain)
     _PROGRAM.say(result_text(result))
     return _PROGRAM.end(output, {bag['bag']: bag['missing'] for bag in result['bags']},

@@ -40,6 +40,7 @@ from stewart_dynamics.identification.unknowns import ORIGINS, Unknowns
 from stewart_dynamics.legs import KINDS
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.possible_errors.hypothesis import likeliest
 
 # Maximum number of extracts that are tested.
 _MOST = 16
@@ -233,9 +234,9 @@ def lack_of_fit(platform: StewartPlatform, extracts: Extracts, noisy: Noisy, unk
     ranked = sorted([*ranked, *(each for each, _ in contradicted)], key=lambda each: -each.gain)
     if not ranked:
         return None
-    best, *others = ranked
-    rivals = any(SAME.get(each.what, each.what) != SAME.get(best.what, best.what)
-                 and best.gain - each.gain < _CLEARLY for each in others)
+    best = ranked[0]
+    rivals = len({SAME.get(each.what, each.what) for _, each in likeliest(
+        ((-each.gain, each) for each in ranked), math.inf, _CLEARLY, logarithms=True)}) > 1
     if len(best.places):
         rest = _ranked(of_all, scores.without(best.places), _NOTICE)
     else:  # numbers that are far from the file's

@@ -80,7 +80,7 @@ class CalibratedLegs(ABC):
     joint_scale : float
         Change of a joint that would matter, by the characteristic length.
     units : mapping
-        Units that positions of drives are given in by mistake, and their sizes.
+        Units that positions of drives may be given in wrongly, and their sizes.
     unit_option : str
         Option by which they are read in the first of these units.
     zero_part : str

@@ -15,7 +15,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Records
 from stewart_dynamics.core.binding import function, places
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.legs import crank_mistakes, crank_tree as tree
+from stewart_dynamics.legs import crank_errors, crank_tree as tree
 from stewart_dynamics.legs.crank_calibration import CrankCalibration
 from stewart_dynamics.legs.kind import (
     AtHome, BaseParameter, IntervalBounds, LegKind, LegMass, Named, Placed, Solid, STANDARD_G,
@@ -425,7 +425,7 @@ class Crank(LegKind):
 
     def wrong_sizes(self, parameters: Parameters, anchors: Array) -> Iterator[PossibleError]:
         """Yield lengths in mm, and rods that are shorter than the gap at home."""
-        return crank_mistakes.wrong_sizes(parameters, anchors)
+        return crank_errors.wrong_sizes(parameters, anchors)
 
     def possible_errors(self, parameters: Parameters, home: AtHome) -> Iterator[PossibleError]:
         """Yield errors in signs and zeros of the cranks, their masses and limits."""
@@ -434,13 +434,13 @@ class Crank(LegKind):
             return iter(())
         above, at_home = (
             _angles_of_branches(parameters, position, home.rotation)[2] for position in (
-                crank_mistakes.above_motors(parameters, home), home.position))
-        return find_errors(crank_mistakes.CRANK_ERRORS, crank_mistakes.Cranks(
+                crank_errors.above_motors(parameters, home), home.position))
+        return find_errors(crank_errors.CRANK_ERRORS, crank_errors.Cranks(
             parameters, home, above, at_home, at.levers(), crank_bodies(parameters)))
 
     def home_rule(self, parameters: Parameters, anchors: Array) -> str:
         """Return that the rods are shorter than the gap, or far too long."""
-        gap = crank_mistakes.gap_of(parameters, anchors)
+        gap = crank_errors.gap_of(parameters, anchors)
         rods = np.unique(parameters['legs.rod.length'])
         return (f'legs.rod.length: {shown(rods.tolist())} m: no level pose has rods of this length'
                 ': while the platform joints are level with the ends of the cranks, at the '
@@ -462,7 +462,7 @@ class Crank(LegKind):
                 f'{parameters["legs.rod.length"][leg]:.6g} m: does not reach the platform joint '
                 'at home, from which geometry.crank_branch: auto follows')
         if undecided:
-            for line in lines_of(crank_mistakes.limits_in_degrees(parameters)):
+            for line in lines_of(crank_errors.limits_in_degrees(parameters)):
                 raise ParameterError(f'{parameters.source}: {line}')
             both, leg = divmod(undecided - 1, 6)
             up, down = (angles[leg].round(9) + 0.0).tolist()  # no -3e-16

@@ -35,7 +35,7 @@ from stewart_dynamics.mechanics.hexapod_structure import hexapod_structure
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
 from stewart_dynamics.mechanics.limits import Limits
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
     FORCES, GRAVITY, JOINT_ANGLES, JOINT_FORCES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE,
@@ -100,7 +100,7 @@ class StewartPlatform:
     @classmethod
     def from_yaml(cls, path: str | Path, node: str = '') -> StewartPlatform:
         """
-        Return the hexapod of a parameter file; ParameterError names the mistake in it.
+        Return the hexapod of a parameter file; ParameterError names the error in it.
 
         A file with several nodes needs the node's name, with its namespace.
         """
@@ -614,7 +614,7 @@ class StewartPlatform:
 
     def check(self) -> tuple[str, ...]:
         """Return possible errors in the parameters, each in one line."""
-        return likely_mistakes(self.parameters)
+        return find_parameter_errors(self.parameters)
 
     def _legs(self, pose: Pose | Motion) -> Lines:
         check_kind(pose, Pose, Motion)

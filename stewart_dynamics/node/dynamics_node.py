@@ -337,9 +337,9 @@ class DynamicsNode(ManagedNode[Parameters]):
             return payload.PayloadOutcome('the node is not active')
         if silence := self._diagnostics.external_wrench.silence(time.monotonic()):
             return payload.PayloadOutcome(silence)
-        mistake = self._measured_legs.mistake
-        if mistake and not leaves_wrench(mistake):
-            return payload.PayloadOutcome(f'possible error: {mistake.text}')
+        error = self._measured_legs.possible_error
+        if error and not leaves_wrench(error):
+            return payload.PayloadOutcome(f'possible error: {error.text}')
         # Parameters are those of now, whatever changes meanwhile.
         return payload.identify(self._history, StewartPlatform(self._settings))
 
@@ -421,7 +421,7 @@ class DynamicsNode(ManagedNode[Parameters]):
             TF in publishers and publishers[TF].get_subscription_count() > 0)
         if notice := self._travel.look():
             self._log.write([LogLine(WARN, notice)])
-        self._diagnostics.mistaken(self._setpoints.mistakes(), now)
+        self._diagnostics.note_errors(self._setpoints.possible_errors(), now)
         if self._diagnostics.due_at_tick(now):
             self._report()
 

@@ -25,7 +25,7 @@ from stewart_dynamics.mechanics.drives.motors import (
     ACCELERATIONS as ACCELERATIONS_OF_MOTORS, ANGLES as ANGLES_OF_MOTORS, AVAILABLE_TORQUES,
     motor_ratio, Motors, SPEEDS)
 from stewart_dynamics.mechanics.dynamics.friction import Friction
-from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
+from stewart_dynamics.mechanics.kinematics.pose_errors import find_pose_error
 from stewart_dynamics.mechanics.limits import (
     ANGLES, CLEARANCE_MIN, Exceedance, LIMITS, result_values, SPEED_MAX, TEMPERATURE_RISE_MAX)
 from stewart_dynamics.mechanics.pose_limits import PoseLimits
@@ -88,8 +88,8 @@ class Checks:
     Finds violations in samples of a trajectory that come in the order of time.
 
     violations: violations found so far, in no order.
-    mistake: the possible error in the first pose in which a drive is outside its range, or which a
-        leg does not reach; empty without one; None without such a pose.
+    possible_error: that in the first pose in which a drive is outside its range, or which a leg
+        does not reach; empty without one; None without such a pose.
     condition_number, condition_time: largest condition number so far, and its time [s].
     force, force_leg: largest absolute effort of a drive so far [N] or [N m], and its leg.
     load: the largest absolute effort so far as a part of its limit.
@@ -116,7 +116,7 @@ class Checks:
         self._parameters, self._kind = parameters, parameters.leg_kind
         self._efforts = self._kind.effort.columns
         self._rises = np.zeros(6)
-        self.mistake: str | None = None
+        self.possible_error: str | None = None
 
     def check(self, samples: Samples) -> list[int]:
         """Check samples and between them; return after which of them closer ones are needed."""
@@ -134,17 +134,18 @@ class Checks:
         self._keep_largest_force(results[:, self._efforts])
         for limit, values in result_values(self._parameters, results).items():
             self._check_limit(limit, values, _of_legs(samples.times))
-        self._name_mistake(samples)
+        self._name_pose_error(samples)
         self._check_cubics(samples)
         return sorted({
             *unclear, *self._check_singularities(samples), *self._reversals(samples)})
 
-    def _name_mistake(self, samples: Samples) -> None:
+    def _name_pose_error(self, samples: Samples) -> None:
         """Name the possible error in the pose with which drives first are outside their ranges."""
         found = [each for each in self.violations if each.limit in self._kind.position_limits]
-        if found and self.mistake is None:
+        if found and self.possible_error is None:
             at = int(np.argmax(samples.times >= found[0].time))
-            self.mistake = pose_mistake(self._parameters, samples.motions[at], first=False)
+            self.possible_error = find_pose_error(
+                self._parameters, samples.motions[at], first=False)
 
     def _note_no_result(self, samples: Samples, n: int) -> None:
         """Note that a sample has no results: a leg does not reach, or numbers overflow."""
@@ -161,8 +162,9 @@ class Checks:
             self.missing = float(missing[worst].max())
             self.missing_time = float(samples.times[unreachable[worst]])
             self.missing_words = unreached(self._joints, missing[worst])
-        if self.mistake is None:
-            self.mistake = pose_mistake(self._parameters, samples.motions[n], first=False)
+        if self.possible_error is None:
+            self.possible_error = find_pose_error(
+                self._parameters, samples.motions[n], first=False)
         self.violations.append(Violation(
             time, UNREACHABLE, f' {unreached(self._joints, missing[0])}',
             int(np.argmax(missing[0]))))

@@ -476,8 +476,8 @@ class _Work:
         # a leg meets the limit of its lever, or another one, before it cannot reach
         more = (f'; at {checks.missing_time:.3f} s {checks.missing_words}'
                 if checks.missing_words and checks.missing_time != violation.time else '')
-        if checks.mistake:
-            more += f'; {checks.mistake}'
+        if checks.possible_error:
+            more += f'; {checks.possible_error}'
         return PlannedTrajectory(
             False, f'rejected: {when}{violation.words}{more}', len(self._times), self._duration,
             violation.reason, violation.time, violation.leg, violation.limit)

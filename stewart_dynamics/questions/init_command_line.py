@@ -68,7 +68,7 @@ def _write(file: Path, force: bool) -> int:
     import readline  # noqa: F401 - answers can be edited
 
     from stewart_dynamics.description.picture import picture
-    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
     from stewart_dynamics.parameters.yaml_file import yaml_text
     from stewart_dynamics.questions.editor_schema import NAMES_SCHEMA, SCHEMA, schema_text
     from stewart_dynamics.questions.questions import ask_hexapod, Dialog, NO, YES
@@ -94,6 +94,5 @@ def _write(file: Path, force: bool) -> int:
         _PROGRAM.say(f'{len(kept)} of {len(given)} numbers are those of the example; {file} marks '
                      f'them: {_KEPT}')
     _PROGRAM.say(f'next: stewart_capability --params {file}')
-    for mistake in likely_mistakes(hexapod.parameters):
-        _PROGRAM.complain(f'warning: {mistake}')
+    _PROGRAM.warn(find_parameter_errors(hexapod.parameters))
     return DONE

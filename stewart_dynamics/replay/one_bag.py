@@ -30,7 +30,7 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.drives.measured_efforts import force_per_effort
 from stewart_dynamics.mechanics.drives.servos import outside_servos, pulse_rows, with_servos
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.joint_state import JointStateReader, NUMBERS_END
 from stewart_dynamics.messages.recorded import Messages
@@ -102,7 +102,7 @@ def replay(
         notices = notices_of(recording, topics, parameters, options)
         with whole_folder(folder, options, before=before) as partial, ExitStack() as stack:
             run = _Run(recording, topics, parameters, options, partial, stack)
-            run.notices += [*likely_mistakes(parameters), *notices]
+            run.notices += [*find_parameter_errors(parameters), *notices]
             answered = 0
             for size in feed_subscribers(recording, run.subscriptions()):
                 if progress is not None:
@@ -271,11 +271,11 @@ class _Run:
             missing.append('no setpoint could be answered')
         elif points.base_unknown == points.answered:
             missing.append("the base's motion is not known at any setpoint: there are no forces")
-        mistakes = self._setpoints.mistakes(ever=True)
+        errors = self._setpoints.possible_errors(ever=True)
         if self._differentiator is not None:
-            mistakes += self._differentiator.stamps.mistakes(True, [inputs.POSE])
+            errors += self._differentiator.stamps.possible_errors(True, [inputs.POSE])
         if self._comparison is not None:
-            mistakes += self._comparison.stamps.mistakes(True, [MEASURED])
+            errors += self._comparison.stamps.possible_errors(True, [MEASURED])
         unreachable = any(each.reason == OUT_OF_REACH for each in self._setpoints.counts)
         measured = None if self._comparison is None else self._comparison.values()
         if measured and not measured.setpoints_compared:
@@ -296,10 +296,10 @@ class _Run:
                 rejection.topic, rejection.reason, number, self._firsts[rejection].details,
                 self._rejected_at(self._firsts[rejection], points))
                 for rejection, number in sorted(self._setpoints.counts.items())],
-            limit_met=(values.limit_met or bool(mistakes) or unreachable
+            limit_met=(values.limit_met or bool(errors) or unreachable
                        or self._outside_servos > 0),
             mistakes=[Mistake(each.topic, each.text, _since_first(each.first, points))
-                      for each in mistakes],
+                      for each in errors],
             measured=measured, response=self.followed and self.followed.values,
             uncertainty=self._uncertain and self._uncertain.values(),
             parameters=self._parameters.plain())

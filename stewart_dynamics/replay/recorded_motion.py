@@ -85,9 +85,9 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         if not known.any():
             raise BagError(f"{bag}: the base's motion is not known at any setpoint")
         recorded = recorded.chosen(known)
-    mistakes = setpoints.mistakes(ever=True)
+    errors = setpoints.possible_errors(ever=True)
     if splines is not None:
-        mistakes += splines.stamps.mistakes(True, [POSE])
+        errors += splines.stamps.possible_errors(True, [POSE])
     stamps, bases = recorded.stamps, recorded.bases
     steps = np.maximum(np.diff(stamps, prepend=stamps[0]), 0)  # a bag that loops
     return RecordedMotion(np.cumsum(steps) * NANOSECOND, Motion.of_rows(recorded.motions.copy()),
@@ -95,4 +95,4 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
                           None if bases is None else BaseMotion.of_rows(bases.copy()), missing,
                           sum(setpoints.counts.values())
                           + (0 if splines is None else splines.left_out.total()),
-                          tuple(each.words for each in mistakes), notices, stamps)
+                          tuple(each.words for each in errors), notices, stamps)

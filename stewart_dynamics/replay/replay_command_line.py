@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
 
 _PROGRAM = Program('stewart_replay', 'parameters or bags',
-                   'a limit or singularity warning was met, or a mistake in measured '
+                   'a limit or singularity warning was met, or a possible error in measured '
                    'efforts is likely', partly=True)
 _CUTOFF = 10.0
 _TOPICS = {
@@ -125,7 +125,7 @@ def _options(given: argparse.Namespace) -> Options:
 def _run(given: argparse.Namespace, options: Options) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import FLEET_PAGE, folders_of_results
-    from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+    from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.replay.bag_report import share_plotly
     from stewart_dynamics.replay.many_bags import replay_fleet
@@ -135,7 +135,7 @@ def _run(given: argparse.Namespace, options: Options) -> int:
     bags = folders_of_results(given.bags, given.output)
     if options.report and given.plotly == 'shared':
         options = options._replace(plotly=share_plotly(given.output))
-    _PROGRAM.prepare(likely_mistakes(parameters))
+    _PROGRAM.prepare(find_parameter_errors(parameters))
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
         return _one(*bags[0], parameters, options, given.strict)
     fleet = replay_fleet(

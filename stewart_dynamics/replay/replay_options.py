@@ -83,6 +83,6 @@ class Options(NamedTuple):
 
 def code_of(summary: BagSummary) -> int:
     """Return the exit code of a replayed bag."""
-    mistake = summary.measured and summary.measured.likely_mistake
+    error = summary.measured and summary.measured.likely_mistake
     return PARTLY_READ if not summary.complete else (
-        LIMIT_MET if summary.limit_met or mistake else DONE)
+        LIMIT_MET if summary.limit_met or error else DONE)

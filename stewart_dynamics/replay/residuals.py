@@ -195,8 +195,8 @@ class Comparison:
 
     def values(self) -> Measured:
         """Return the comparison."""
-        parameters, mistake, count = self._parameters, self._sums.mistake(), self._legs.count
-        load_known = leaves_wrench(mistake)
+        parameters, error, count = self._parameters, self._sums.find_error(), self._legs.count
+        load_known = leaves_wrench(error)
         wrench = self._wrench if load_known else _Statistics()
         residual, measured = np.sum(self._legs.squares), np.sum(self._sums.measured_squares)
         found = of_kind(Measured, parameters.leg_kind)(
@@ -210,7 +210,7 @@ class Comparison:
             residual_share=float(np.sqrt(residual / measured)) if measured else None,
             legs={joint: self._leg(leg) for leg, joint in enumerate(parameters.joints)},
             external_wrench_given=load_known,
-            likely_mistake=mistake and EffortsMistake(mistake.what, mistake.text),
+            likely_mistake=error and EffortsMistake(error.what, error.text),
             external_wrench=ExternalWrench(**{
                 axis: kind(*wrench.of_quantity(n))
                 for n, (axis, kind) in enumerate(zip(AXES, LOADS_OF_WRENCH, strict=True))}),

@@ -12,7 +12,7 @@ import shlex
 import textwrap
 
 from stewart_dynamics.legs.kind import LegKind
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import NODE
 from stewart_dynamics.replay.bag_summary import BagSummary, LegLoads, Measured
@@ -40,8 +40,8 @@ def summary_text(summary: BagSummary, parameters: Parameters) -> str:
     if summary.response:
         lines += _response_lines(summary.response)
     lines += summary_lines(summary)
-    mistakes = likely_mistakes(parameters)
-    lines += [notice for notice in summary.notices if notice not in mistakes]
+    errors = find_parameter_errors(parameters)
+    lines += [notice for notice in summary.notices if notice not in errors]
     for each in summary.rejected:
         rejection = Rejection(each.topic, each.reason).counted(each.count)
         when = '' if each.first_at_s is None else at_time(each.first_at_s, 3)
@@ -97,8 +97,8 @@ def measured_headline(measured: Measured) -> str:
     """Return by how much measured and computed efforts differ."""
     if not measured.setpoints_compared:
         return 'no setpoint could be compared'
-    mistake = measured.likely_mistake
-    likely = '' if mistake is None else f'possible error: {mistake.text}; ' + (
+    error = measured.likely_mistake
+    likely = '' if error is None else f'possible error: {error.text}; ' + (
         '' if measured.external_wrench_given else 'no external wrench is given; ')
     effort = measured.kind.effort
     worst, leg = max((leg.residual_rms or 0.0, name) for name, leg in measured.legs.items())

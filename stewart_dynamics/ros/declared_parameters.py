@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros, other_nodes, read_value
@@ -241,7 +241,7 @@ def log_changes(before: Parameters, after: Parameters) -> Iterator[tuple[int, st
                for name, value in after.given.items() if value != before.given.get(name)]
     if changes:
         yield INFO, '; '.join(changes), None
-    known = likely_mistakes(before, geometry=False)
-    for mistake in likely_mistakes(after, geometry=False):
-        if mistake not in known:
-            yield WARNING, mistake, None
+    known = find_parameter_errors(before, geometry=False)
+    for error in find_parameter_errors(after, geometry=False):
+        if error not in known:
+            yield WARNING, error, None

@@ -14,7 +14,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.errors import ParameterError, StewartError
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.ros.declared_parameters import (
@@ -80,8 +80,8 @@ class ManagedNode(LifecycleNode, Generic[Kind]):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the topics."""
         try:
-            for mistake in likely_mistakes(self._settings):
-                self.get_logger().warning(mistake)
+            for error in find_parameter_errors(self._settings):
+                self.get_logger().warning(error)
             self.open_topics()
         except Exception as exc:
             # rclpy turns an exception in a transition into ERROR and logs nothing.

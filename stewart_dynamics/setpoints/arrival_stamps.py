@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND, Stamps
-from stewart_dynamics.setpoints.consistency import Mistake
+from stewart_dynamics.setpoints.consistency import MessageError
 
 # A block is judged when it has this many readings and is this long [ns].
 _FEWEST, _SHORTEST = 48, SECOND // 2
@@ -45,11 +45,11 @@ class ArrivalStamps:
         self.found: tuple[str, int] | None = None
         """The first one."""
 
-    def mistakes(self, ever: bool, topics: Sequence[str]) -> list[Mistake]:
-        """Return the first mistake if ``ever``, else the present one, for each of the topics."""
+    def possible_errors(self, ever: bool, topics: Sequence[str]) -> list[MessageError]:
+        """Return the first error if ``ever``, else the present one, for each of the topics."""
         found = self.found if ever else self.present
         return [] if found is None else [
-            Mistake(topic, f'possible error: {found[0]}', found[1]) for topic in topics]
+            MessageError(topic, f'possible error: {found[0]}', found[1]) for topic in topics]
 
     def add_readings(self, stamps: ArrayLike, readings: ArrayLike) -> None:
         """Add readings (N, n) of any units at their stamps (N,) [ns]."""

@@ -13,7 +13,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.rows import BASE, GRAVITY
 from stewart_dynamics.parameters.table import MOVING, Parameters
 from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
-from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, Mistake
+from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, MessageError
 from stewart_dynamics.setpoints.inconsistency import QUANTITIES, RATES
 from stewart_dynamics.setpoints.input_messages import BASE_ACCEL, BASE_TWIST
 from stewart_dynamics.setpoints.input_stream import Clock, InputStream, Joined
@@ -45,14 +45,14 @@ class BaseInput:
         """Return stamp [ns] and row (BASE,) of the last sample."""
         return self._stream.last_base()
 
-    def mistakes(self, ever: bool) -> list[Mistake]:
-        """Return the possible errors in the motion of the base, as ``Setpoints.mistakes`` does."""
+    def possible_errors(self, ever: bool) -> list[MessageError]:
+        """Return those in the motion of the base, see ``Setpoints.possible_errors``."""
         found = inconsistencies(self.consistency, ever, dict.fromkeys(
             QUANTITIES, BASE_TWIST) | dict.fromkeys(RATES, BASE_ACCEL))
         if self._gravity is not None:
             of_gravity = self._gravity.found.values() if ever else [self._gravity.present]
-            found += [Mistake(self.topics[0], *each) for each in of_gravity if each]
-        found += self._stamps.mistakes(ever, self.topics[:1])
+            found += [MessageError(self.topics[0], *each) for each in of_gravity if each]
+        found += self._stamps.possible_errors(ever, self.topics[:1])
         return found
 
     def at_rest(self, known: bool) -> Array | None:

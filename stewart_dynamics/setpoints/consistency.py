@@ -72,7 +72,7 @@ SLOWEST, WEAKEST = 2e-3, 0.05
 _SMALLEST, _SMALLEST_INTEGRAL = 1e-5, 5e-3
 
 
-class Mistake(NamedTuple):
+class MessageError(NamedTuple):
     """A possible error in the messages of a topic."""
 
     topic: str
@@ -82,7 +82,7 @@ class Mistake(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Return the mistake in one line."""
+        """Return the error in one line."""
         return f'{self.topic}: {self.text}'
 
 
@@ -260,9 +260,9 @@ class Consistency:
 
 def inconsistencies(
         consistency: Consistency | None, ever: bool, topics: Mapping[str, str],
-        reasons: bool = True) -> list[Mistake]:
+        reasons: bool = True) -> list[MessageError]:
     """
-    Return the inconsistencies of a stream as mistakes.
+    Return the inconsistencies of a stream as possible errors.
 
     ever: all that were found, else the present ones.
     topics: the topic of each quantity.
@@ -273,7 +273,7 @@ def inconsistencies(
     found = consistency.found if ever else consistency.present
     shown = {name: each if reasons or each.of != POSES else each._replace(reason='')
              for name, each in found.items()}
-    return [Mistake(topics[name], each.words, each.first, each.values)
+    return [MessageError(topics[name], each.words, each.first, each.values)
             for name, each in shown.items()]
 
 

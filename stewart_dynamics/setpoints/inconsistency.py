@@ -145,7 +145,7 @@ def _of_axes(quantity: str, sums: Sums, axes: str, body: str) -> Iterator[tuple[
 
 
 def _factor_words(quantity: str, factor: float, step: float) -> str:
-    """Return a constant factor in words, with the mistake that has it."""
+    """Return a constant factor in words, with the error that has it."""
     words = name_of_factor(factor, _FACTORS[quantity].items(), 1.0 + _NEAR)
     if abs(factor / step - 1.0) < _NEAR:
         words = 'differences not divided by the time between two samples?'

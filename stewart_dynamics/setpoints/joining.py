@@ -17,12 +17,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Six, Stamps
-from stewart_dynamics.mechanics.kinematics.pose_mistakes import (
-    IN_DEGREES, pose_mistake, PoseByAngles)
+from stewart_dynamics.mechanics.kinematics.pose_errors import (
+    find_pose_error, IN_DEGREES, PoseByAngles)
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.setpoints.base_input import BaseInput
-from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, Mistake
+from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, MessageError
 from stewart_dynamics.setpoints.inconsistency import QUANTITIES, RATES
 from stewart_dynamics.setpoints.input_messages import ACCEL, COMBINED, SOURCES, TWIST
 from stewart_dynamics.setpoints.input_stream import Clock, InputStream, Joined
@@ -77,7 +77,7 @@ class Setpoints:
         """Return the known load on the platform, from the last ``~/wrench`` [N, N m]."""
         return self._stream.wrench
 
-    def mistakes(self, ever: bool = False) -> list[Mistake]:
+    def possible_errors(self, ever: bool = False) -> list[MessageError]:
         """
         Return the possible errors in setpoints and base motion.
 
@@ -86,30 +86,31 @@ class Setpoints:
         self._note_setpoints()
         found = inconsistencies(self._consistency, ever, self._topic_of)
         # The last pose is judged only where twists differ.
-        mistake = (self._angle_mistake() or self._pose_mistake('first', self._first) if ever
-                   else self._pose_mistake('last', self._last) if found else [])
-        if mistake:
-            # Derivatives of wrong poses do not show the mistake in twists.
+        of_pose = (self._angle_error() or self._pose_error('first', self._first) if ever
+                   else self._pose_error('last', self._last) if found else [])
+        if of_pose:
+            # Derivatives of wrong poses do not show the error in twists.
             found = inconsistencies(self._consistency, ever, self._topic_of, reasons=False)
-        return mistake + found + self.base.mistakes(ever)
+        return of_pose + found + self.base.possible_errors(ever)
 
-    def _angle_mistake(self) -> list[Mistake]:
+    def _angle_error(self) -> list[MessageError]:
         """Return the possible error in most poses by angles without a unit, if they are wrong."""
-        found = Counter(pose_mistake(self._parameters, pose.row, False, pose.angles)
+        found = Counter(find_pose_error(self._parameters, pose.row, False, pose.angles)
                         for pose in self.unknown_angles)
         for text, count in found.most_common(1):
             if IN_DEGREES in text and 2 * count >= found.total():
                 pose = max(self.unknown_angles, key=lambda each: each.angles.largest)
-                return [Mistake(self.topics[0], f'{text}: {pose.angles.largest:.3g} is read in '
-                                                f'rad; {pose.advice} reads degrees')]
+                return [MessageError(self.topics[0], (
+                    f'{text}: {pose.angles.largest:.3g} is read in rad; {pose.advice} reads '
+                    'degrees'))]
         return []
 
-    def _pose_mistake(self, which: str, motion: Array) -> list[Mistake]:
+    def _pose_error(self, which: str, motion: Array) -> list[MessageError]:
         """Return the possible error in the pose of a row of motion."""
         if not len(motion):
             return []
-        text = pose_mistake(self._parameters, motion.tolist(), first=motion is self._first)
-        return [Mistake(self.topics[0], f'{which} setpoint: {text}')] if text else []
+        text = find_pose_error(self._parameters, motion.tolist(), first=motion is self._first)
+        return [MessageError(self.topics[0], f'{which} setpoint: {text}')] if text else []
 
     def judge(self) -> None:
         """Check setpoints and samples so far, if there are enough; called when there is time."""

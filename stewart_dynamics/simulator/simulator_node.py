@@ -21,7 +21,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import SECOND, Six
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
@@ -82,8 +82,8 @@ class SimulatorNode(Node):
         self._settings = declare_parameters(self, SimulatorParameters)
         self._stepped = is_simulated(self)
         self._log = RepeatedLog(self.get_logger())
-        for mistake in likely_mistakes(self._settings):
-            self.get_logger().warning(mistake)
+        for error in find_parameter_errors(self._settings):
+            self.get_logger().warning(error)
         begun = time.monotonic()
         self._plant = SIGNALS.interruptible(partial(type(self).plant, self._settings))
         self._state_messages = StateMessages(self._settings)

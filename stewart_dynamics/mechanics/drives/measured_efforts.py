@@ -20,7 +20,7 @@ from stewart_dynamics.possible_errors.transforms import name_of_factor
 
 # A scale of the efforts within this ratio of a known factor is attributed to that factor.
 _NEAR = 1.35
-# A scale that differs from 1 by a larger ratio is a mistake; a smaller one is that of torques.
+# A scale that differs from 1 by a larger ratio is an error; a smaller one is that of torques.
 FAR, _TORQUES = 2.0, 0.05
 ZERO, SIGN, UNIT, TORQUE, FORCE, SCALE, SWAPPED = (
     'zero', 'sign', 'unit', 'torque', 'force', 'scale', 'swapped')
@@ -85,9 +85,9 @@ def without_losses(forces: Array, rates: Array, accelerations: Array, p: Paramet
     return loads
 
 
-def leaves_wrench(mistake: PossibleError | None) -> bool:
+def leaves_wrench(error: PossibleError | None) -> bool:
     """Return whether measured efforts give an external wrench; those of a wrong scale do."""
-    return mistake is None or mistake.what == SCALE
+    return error is None or error.what == SCALE
 
 
 class EffortSums:
@@ -125,7 +125,7 @@ class EffortSums:
         scale = self._scale()
         return scale is not None and 1.0 / FAR < scale < FAR
 
-    def mistake(self) -> PossibleError | None:
+    def find_error(self) -> PossibleError | None:
         """Return the possible error in the efforts; None without one."""
         residual = float(self._residuals.sum())
         # Friction may hold the platform with any force up to its own.
@@ -133,7 +133,7 @@ class EffortSums:
         if residual <= friction:
             return None
         scale = self._scale()
-        found = None if scale is None else mistake_of_scale(
+        found = None if scale is None else find_scale_error(
             scale, self._parameters, self._of_motors)
         return found or next(find_errors(_ONE_LEG, self), None) or self._swapped()
 
@@ -234,7 +234,7 @@ _SCALES: Table[_Scale] = First(
         _Of(SCALE, lambda s: True, _TIMES + 'another unit, or a wrong platform.mass'))))
 
 
-def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> PossibleError | None:
+def find_scale_error(scale: float, p: Parameters, of_motors: bool) -> PossibleError | None:
     """
     Return the possible error if efforts are ``scale`` times the model's; None without one.
 
@@ -247,7 +247,7 @@ def mistake_of_scale(scale: float, p: Parameters, of_motors: bool) -> PossibleEr
 
 
 def known_scales(p: Parameters, of_motors: bool) -> list[float]:
-    """Return the scales of efforts that ``mistake_of_scale`` attributes to a unit."""
+    """Return the scales of efforts that ``find_scale_error`` attributes to a unit."""
     if of_motors:
         return _per_effort(p)
     torque = float(np.mean(1.0 / motor_ratio(p)))

@@ -19,7 +19,7 @@ from statistics import median
 
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND
 from stewart_dynamics.mechanics.drives.servos import outside_servos, with_servos
-from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
+from stewart_dynamics.mechanics.kinematics.pose_errors import find_pose_error
 from stewart_dynamics.mechanics.limits import (
     Exceedance, JUMP, LEVER_MIN, LIMITS, limits_of, TORQUE_MAX, TORQUE_SPEED)
 from stewart_dynamics.mechanics.rows import (
@@ -155,9 +155,9 @@ class SingularityDiagnostics(StatusPart):
         self._crossing_logged_at = -PERIOD
         self._largest = 1.0
 
-    def begins(self, mistake: str, other_side: bool) -> None:
+    def begins(self, error: str, other_side: bool) -> None:
         """Note the possible error in the first pose, and whether it is beyond a singularity."""
-        self._other_side = mistake if other_side else ''
+        self._other_side = error if other_side else ''
 
     def answered(self, now: float) -> bool:
         """Note the last outputs; return whether they must be reported at once, at any level."""
@@ -251,7 +251,7 @@ class LimitsDiagnostics(StatusPart):
         self._worst: dict[str, Exceedance] = {}
         self._suppressed = 0
         self._exceeding = False
-        self._mistake = ''  # in the pose with which legs became too long or too short
+        self._pose_error = ''  # in the pose with which legs became too long or too short
         self._largest_effort, self._its_leg = 0.0, 0
 
     def answered(self, setpoint: Batch, exceedances: Sequence[Exceedance], now: float) -> None:
@@ -304,7 +304,7 @@ class LimitsDiagnostics(StatusPart):
         self._suppressed += suppressed
         if not any(self.held.of(name, now).level for name in self._of_pose):
             # At most once in a second: it may take a millisecond.
-            self._mistake = pose_mistake(
+            self._pose_error = find_pose_error(
                 self._answers.parameters, setpoint.motions[0].tolist(),
                 first=self._answers.number == 1)
         for name in LIMITS:
@@ -316,8 +316,8 @@ class LimitsDiagnostics(StatusPart):
             words = self._words(worst, len(exceeded) - 1)
             if suppressed and not LIMITS[name].clips:
                 words += f'; {self._kind.effort.field} suppressed'
-            if self._mistake and name in self._of_pose:
-                words = f'{self._mistake}; {words}'
+            if self._pose_error and name in self._of_pose:
+                words = f'{self._pose_error}; {words}'
             self.held.see(Level(ERROR, words), now, name)
             self._setpoints[name] += 1
             self._worst[name] = max(worst, self._worst.get(name, worst), key=_excess)

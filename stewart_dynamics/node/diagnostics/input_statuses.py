@@ -17,7 +17,8 @@ from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
 from stewart_dynamics.node.diagnostics.answers import Answers
 from stewart_dynamics.node.diagnostics.levels import (
-    ERROR, Level, LogLine, MISTAKEN, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
+    ERROR, Level, LogLine, NEVER, OK, POSSIBLE_ERRORS, REJECTED, STALE, Status, StatusPart, Values,
+    WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import SECONDS
 from stewart_dynamics.setpoints.base_input import BaseInput
@@ -37,7 +38,7 @@ class SetpointDiagnostics(StatusPart):
     name = 'setpoints'
 
     def __init__(self, answers: Answers, topics: Sequence[str]) -> None:
-        super().__init__(REJECTED, INCOMPLETE, MISTAKEN)
+        super().__init__(REJECTED, INCOMPLETE, POSSIBLE_ERRORS)
         self._answers = answers
         self.heard = dict.fromkeys(topics, NEVER)  # when the last message came on each topic
         self._writers: dict[str, int] = {}
@@ -95,7 +96,7 @@ class SetpointDiagnostics(StatusPart):
         if not found:
             found = [self.held.of(REJECTED, now).message
                      or self.held.of(INCOMPLETE, now).message
-                     or self.held.of(MISTAKEN, now).message or 'answered']
+                     or self.held.of(POSSIBLE_ERRORS, now).message or 'answered']
         number = len(answers.second_before.times) + len(answers.second.times)
         seconds = now - answers.second_before.begin
         rate = number / seconds if seconds > 0.0 else 0.0
@@ -105,17 +106,17 @@ class SetpointDiagnostics(StatusPart):
         values += _last_heard(self.heard, now)
         values += [(f'{topic}: writers', str(n)) for topic, n in self._writers.items()]
         values += [(f'{topic}: readers', str(n)) for topic, n in self._readers.items()]
-        values += self._mistake_values() + self._rejection_values()
+        values += self._error_values() + self._rejection_values()
         return Status(self.name, self.level(now), ', '.join(found), values)
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """
-        Return warnings of another node of this name, mistakes, and messages without a setpoint.
+        Return warnings of namesakes, possible errors, and messages without a setpoint.
 
         Nothing else: rejections are logged one by one, and without setpoints there is no
         fault.
         """
-        lines, self._lines = self._lines + self._mistake_lines(now), []
+        lines, self._lines = self._lines + self._error_lines(now), []
         last = max(self.heard.values())
         if last <= self._answers.at:
             self._incomplete_since = math.inf
@@ -152,7 +153,7 @@ class BaseDiagnostics(StatusPart):
     name = 'base'
 
     def __init__(self, parameters: Parameters, topics: Sequence[str]) -> None:
-        super().__init__(REJECTED, _UNKNOWN, MISTAKEN)
+        super().__init__(REJECTED, _UNKNOWN, POSSIBLE_ERRORS)
         self._timeout = parameters.base.timeout
         self.heard = dict.fromkeys(topics, NEVER)  # when the last message came on each topic
         self._samples = 0
@@ -194,18 +195,18 @@ class BaseDiagnostics(StatusPart):
         values += [(f'{name} {axis} ({unit})', f'{number:.6g}') for name, unit, part in _OF_BASE
                    for axis, number in zip('xyz', self._row[part], strict=False)]
         # The first of the highest level; a known motion is the last.
-        found = [self.held.of(REJECTED, now), self.held.of(MISTAKEN, now), self._lack(now)]
+        found = [self.held.of(REJECTED, now), self.held.of(POSSIBLE_ERRORS, now), self._lack(now)]
         worst = max(found, key=lambda each: each.level) if any(
             each.level for each in found) else found[-1]
         return Status(self.name, *worst,
-                      values + self._mistake_values() + self._rejection_values())
+                      values + self._error_values() + self._rejection_values())
 
     def log_lines(self, status: Status, now: float) -> list[LogLine]:
         """Return that there are no forces, and that there are again; rejections are logged."""
         # Where nothing has begun, nothing is wrong.
         if not self._samples and not self._unknown:
             return []
-        return self._changed(*self._lack(now)) + self._mistake_lines(now)
+        return self._changed(*self._lack(now)) + self._error_lines(now)
 
     def _lack(self, now: float) -> Level:
         """Return whether the base's motion is missing."""

@@ -10,7 +10,7 @@ from collections.abc import Hashable, Sequence
 import math
 from typing import NamedTuple
 
-from stewart_dynamics.setpoints.consistency import Mistake
+from stewart_dynamics.setpoints.consistency import MessageError
 from stewart_dynamics.setpoints.rejections import Rejection
 
 # Levels of diagnostic_msgs/DiagnosticStatus.
@@ -27,7 +27,7 @@ NEVER = -math.inf
 _HOLD_SECONDS = 1.0
 
 REJECTED = ''  # the cause of a level that every status has
-MISTAKEN = 'mistaken'  # that of possible errors in messages
+POSSIBLE_ERRORS = 'possible errors'  # in messages
 
 
 class Level(NamedTuple):
@@ -129,7 +129,7 @@ class StatusPart:
         self.held = Held(*causes)
         self.rejections = Counter[Rejection]()
         self._logged: dict[str, int] = {}
-        self._mistakes: Sequence[Mistake] = ()
+        self._errors: Sequence[MessageError] = ()
 
     def rejected(self, rejection: Rejection, details: str, now: float,
                  cause: str = REJECTED) -> None:
@@ -138,11 +138,11 @@ class StatusPart:
         self.held.happened(
             Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now, cause)
 
-    def mistaken(self, mistakes: Sequence[Mistake], now: float) -> None:
+    def note_errors(self, errors: Sequence[MessageError], now: float) -> None:
         """Note the possible errors in the messages; they last until the next call."""
-        self._mistakes = mistakes
-        self.held.see(Level(WARN if mistakes else OK, '; '.join(
-            each.words for each in mistakes)), now, MISTAKEN)
+        self._errors = errors
+        self.held.see(Level(WARN if errors else OK, '; '.join(
+            each.words for each in errors)), now, POSSIBLE_ERRORS)
 
     def level(self, now: float) -> int:
         """Return the present level."""
@@ -163,13 +163,14 @@ class StatusPart:
         self._logged[cause] = level
         return [LogLine(level, f'{self.name}: {message}')]
 
-    def _mistake_lines(self, now: float) -> list[LogLine]:
+    def _error_lines(self, now: float) -> list[LogLine]:
         """Return the log line where possible errors begin or end."""
-        level, message = self.held.of(MISTAKEN, now)
-        return self._changed(level, message or 'no possible errors in the messages', MISTAKEN)
+        level, message = self.held.of(POSSIBLE_ERRORS, now)
+        return self._changed(
+            level, message or 'no possible errors in the messages', POSSIBLE_ERRORS)
 
-    def _mistake_values(self) -> Values:
-        return [value for each in self._mistakes for value in each.values]
+    def _error_values(self) -> Values:
+        return [value for each in self._errors for value in each.values]
 
     def _rejection_values(self) -> Values:
         return [(f'rejected, {topic}: {reason}', str(n))

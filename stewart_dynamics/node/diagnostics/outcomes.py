@@ -22,11 +22,12 @@ from stewart_dynamics.legs.kind import Named
 from stewart_dynamics.mechanics.drives.measured_efforts import leaves_wrench
 from stewart_dynamics.mechanics.rows import PARTS_OF_WRENCH
 from stewart_dynamics.node.diagnostics.levels import (
-    ERROR, Level, LogLine, MISTAKEN, NEVER, OK, REJECTED, STALE, Status, StatusPart, Values, WARN)
+    ERROR, Level, LogLine, NEVER, OK, POSSIBLE_ERRORS, REJECTED, STALE, Status, StatusPart, Values,
+    WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.trajectory_messages import PlannedOutcome
 from stewart_dynamics.possible_errors.hypothesis import PossibleError
-from stewart_dynamics.setpoints.consistency import Mistake
+from stewart_dynamics.setpoints.consistency import MessageError
 
 _OVERLOAD = 'overload'  # a cause of a level
 _COMPONENTS = [f'{part} {axis} ({unit})'
@@ -40,7 +41,7 @@ class ExternalWrenchDiagnostics(StatusPart):
     name = 'external wrench'
 
     def __init__(self, parameters: Parameters) -> None:
-        super().__init__(MISTAKEN, _OVERLOAD, REJECTED)
+        super().__init__(POSSIBLE_ERRORS, _OVERLOAD, REJECTED)
         self._joints, self._effort = parameters.joints, parameters.leg_kind.effort
         self._timeout = parameters.setpoint.timeout
         # Times of the first and the last message, and of the last one that was not rejected.
@@ -49,7 +50,7 @@ class ExternalWrenchDiagnostics(StatusPart):
         self._estimated_at = NEVER
         self._estimate: Estimate | None = None
         self._target: Sequence[float] | None = None
-        self._mistake: PossibleError | None = None
+        self._error: PossibleError | None = None
 
     def heard(self, now: float) -> None:
         """Note that a message has arrived."""
@@ -61,9 +62,9 @@ class ExternalWrenchDiagnostics(StatusPart):
         """Note an estimate, and the row of motion of the last setpoint; None without one."""
         self._estimate, self._target = estimate, target
         self.used_at = now
-        if estimate.mistake != self._mistake:
-            self._mistake = estimate.mistake
-            self.mistaken([] if self._mistake is None else [_mistake(self._mistake)], now)
+        if estimate.possible_error != self._error:
+            self._error = estimate.possible_error
+            self.note_errors([] if self._error is None else [_message_error(self._error)], now)
         if estimate.wrench is not None:
             self._estimated += estimate.published is not None
             self._estimated_at = now
@@ -85,7 +86,7 @@ class ExternalWrenchDiagnostics(StatusPart):
             values.append(('age of the last (s)', f'{now - self._estimated_at:.3f}'))
         if self._estimate is not None:
             values += self._numbers(self._estimate)
-        values += self._mistake_values()
+        values += self._error_values()
         message = (self._no_wrench(now) if self._is_stale(now)
                    else self.held.at(now).message or 'no overload')
         return Status(self.name, self.level(now), message, values + self._rejection_values())
@@ -122,10 +123,10 @@ class ExternalWrenchDiagnostics(StatusPart):
         return values
 
 
-def _mistake(found: PossibleError) -> Mistake:
+def _message_error(found: PossibleError) -> MessageError:
     """Return the possible error in the efforts for the status."""
     wrench = '' if leaves_wrench(found) else '; no external wrench is published'
-    return Mistake(MEASURED_LEGS, f'possible error: {found.text}{wrench}', values=(
+    return MessageError(MEASURED_LEGS, f'possible error: {found.text}{wrench}', values=(
         ('possible error in the measurements', found.what),))
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
-from stewart_dynamics.mechanics.kinematics.pose_mistakes import pose_mistake
+from stewart_dynamics.mechanics.kinematics.pose_errors import find_pose_error
 from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.node.diagnostics.answers import (
     Answers, LimitsDiagnostics, SingularityDiagnostics, TimingDiagnostics)
@@ -19,7 +19,7 @@ from stewart_dynamics.node.diagnostics.levels import LogLine, PERIOD, REJECTED, 
 from stewart_dynamics.node.diagnostics.outcomes import (
     ExternalWrenchDiagnostics, PayloadDiagnostics, PlannedTrajectoryDiagnostics)
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.consistency import Mistake
+from stewart_dynamics.setpoints.consistency import MessageError
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 from stewart_dynamics.setpoints.step import Batch, Outputs
 
@@ -52,7 +52,7 @@ class DynamicsDiagnostics:
         """Note the first setpoint, a row of motion, and its det(J) [m^3]."""
         parameters = self.answers.parameters
         self.singularity.begins(
-            pose_mistake(parameters, motion),
+            find_pose_error(parameters, motion),
             determinant * determinant_at_home(parameters) < 0.0)
 
     def answered(self, setpoint: Batch, outputs: Outputs, exceedances: Sequence[Exceedance],
@@ -79,11 +79,11 @@ class DynamicsDiagnostics:
             if rejection.reason == DROPPED:
                 self.timing.rejected(rejection, details, now)
 
-    def mistaken(self, mistakes: Sequence[Mistake], now: float) -> None:
+    def note_errors(self, errors: Sequence[MessageError], now: float) -> None:
         """Note the possible errors in setpoints and base motion."""
-        of_base = [each for each in mistakes if each.topic in self.base.heard]
-        self.base.mistaken(of_base, now)
-        self.setpoints.mistaken([each for each in mistakes if each not in of_base], now)
+        of_base = [each for each in errors if each.topic in self.base.heard]
+        self.base.note_errors(of_base, now)
+        self.setpoints.note_errors([each for each in errors if each not in of_base], now)
 
     def level_changed(self, now: float) -> bool:
         """Return whether a level has changed since the last report."""

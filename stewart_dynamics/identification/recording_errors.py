@@ -26,7 +26,7 @@ from stewart_dynamics.identification.unknowns import regressor_of, Unknowns
 from stewart_dynamics.identification.window_poses import first_pose, motions, pose_near, poses
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.drives.measured_efforts import (
-    FAR, known_scales, mistake_of_scale)
+    FAR, find_scale_error, known_scales)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.possible_errors.hypothesis import likeliest, PossibleError
@@ -157,8 +157,8 @@ def of_efforts(comparison: Comparison, p: Parameters, of_motors: bool) -> Iterat
         # a known one, though the mass of the file is far off
         known = comparison.likeliest_scales(each for each in known_scales(p, of_motors)
                                             if scale and 1.0 / FAR < each / scale < FAR)
-        if mistake := mistake_of_scale([*known, scale][0], p, of_motors):
-            yield mistake
+        if error := find_scale_error([*known, scale][0], p, of_motors):
+            yield error
 
 
 def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit,

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Possible errors in parameters of cranks: none in good hexapods, one line for each mistake."""
+"""Possible errors in parameters of cranks: none in good hexapods, one line for each error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 from referees import rng, ROOT
 from snapshot import Snapshot
 from stewart_dynamics import Parameters, StewartPlatform
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -70,7 +70,7 @@ GOOD = {'rig': RIG, 'head': Parameters(HEAD), 'hanging': Parameters(HANGING),
 @pytest.mark.parametrize('name', GOOD)
 def test_good_hexapods_give_no_warning(name: str) -> None:
     parameters = GOOD[name]
-    assert likely_mistakes(parameters) == ()
+    assert find_parameter_errors(parameters) == ()
     platform = StewartPlatform(parameters)
     angles = np.abs(platform.inverse_kinematics(platform.home_pose()))
     assert angles == pytest.approx(np.full(6, angles[0]), abs=1e-12)
@@ -81,7 +81,7 @@ def test_random_hexapods_give_no_warning() -> None:
     """Six different cranks each, of both branches, axes of any heading."""
     for seed in range(20):
         parameters = parameters_of(random_machine(rng(seed), 1.0))
-        assert likely_mistakes(parameters) == (), seed
+        assert find_parameter_errors(parameters) == (), seed
 
 
 @pytest.mark.parametrize('name', ['rig', 'head', 'hanging'])
@@ -92,7 +92,7 @@ def test_hexapods_of_any_size_give_no_warning(name: str, size: float) -> None:
     p = GOOD[name]
     scaled = {each: np.ravel(p[each]) * size ** powers[p.unit_of(each)] for each in p.given
               if p.unit_of(each) in powers}
-    assert likely_mistakes(p.replaced({
+    assert find_parameter_errors(p.replaced({
         each: value if np.size(p[each]) > 1 else float(value[0])
         for each, value in scaled.items()})) == ()
 
@@ -225,9 +225,9 @@ SEVERAL = {'both in mm', 'all in mm', 'angles in degrees'}
 
 
 @pytest.mark.parametrize('name', SLIPS)
-def test_a_mistake_is_reported_once(name: str, snapshot: Snapshot) -> None:
+def test_a_possible_error_is_reported_once(name: str, snapshot: Snapshot) -> None:
     hexapod, changes, begin = SLIPS[name]
-    found = likely_mistakes(GOOD[hexapod].replaced({
+    found = find_parameter_errors(GOOD[hexapod].replaced({
         each: np.ravel(value) if np.ndim(value) else value for each, value in changes.items()}))
     assert found and found[0].startswith(begin), found
     assert len(found) == 1 or name in SEVERAL, found
@@ -236,10 +236,10 @@ def test_a_mistake_is_reported_once(name: str, snapshot: Snapshot) -> None:
         snapshot(each)
 
 
-def test_mistakes_of_a_hexapod_that_cannot_be_assembled_are_not_followed_by_others() -> None:
+def test_errors_of_a_hexapod_that_cannot_be_assembled_are_not_followed_by_others() -> None:
     """A StewartPlatform of it raises the error; the check has nothing to say of poses."""
     undecided = RIG.replaced({'limits.angle_min': -4.0, 'limits.angle_max': 4.0})
-    assert likely_mistakes(undecided) == ()
+    assert find_parameter_errors(undecided) == ()
 
 
 @pytest.mark.parametrize(('limits', 'found'), [
@@ -250,7 +250,7 @@ def test_limits_of_angles_beyond_a_servo_are_named(limits: dict[str, Any], found
     rig = RIG.replaced({
         'servo.angle_at_min': [-1.2, 1.2, -1.2, 0.9, -1.2, 1.2],
         'servo.angle_at_max': [1.2, -1.2, 1.2, -1.1, 1.2, -1.2], **limits})
-    words = likely_mistakes(rig)
+    words = find_parameter_errors(rig)
     assert len(words) == bool(found)
     assert all(f'limits.angle_max: {found}: the servo of leg_4 ends at 0.9 rad' in each
                for each in words)

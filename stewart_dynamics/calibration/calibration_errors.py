@@ -99,7 +99,7 @@ _REPEATED: Table[Measured] = Hypothesis('repeated', lambda m: m.repeated - _COPI
     'independent, and standard errors come out too small: remove them'))
 
 
-def mistakes_of_input(measured: Measured) -> Iterator[PossibleError]:
+def find_input_errors(measured: Measured) -> Iterator[PossibleError]:
     """Yield the likeliest error in positions, poses or their angles, if one is likely; copies."""
     yield from _likeliest_transform(measured)
     yield from find_errors(_REPEATED, measured)

@@ -23,8 +23,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.legs.kind import AtHome
 from stewart_dynamics.legs.lines import lines_from
-from stewart_dynamics.mechanics import gravity_mistakes
-from stewart_dynamics.mechanics.drives.drive_mistakes import drive_errors
+from stewart_dynamics.mechanics import gravity_errors
+from stewart_dynamics.mechanics.drives.drive_errors import drive_errors
 from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.frames.motion import listed, Motion
@@ -33,7 +33,7 @@ from stewart_dynamics.mechanics.kinematics.home_pose import (
     turns_about)
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
 from stewart_dynamics.mechanics.kinematics.joint_axes import AXES
-from stewart_dynamics.mechanics.kinematics.pose_mistakes import typed_pose_mistake
+from stewart_dynamics.mechanics.kinematics.pose_errors import find_typed_pose_error
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.limits import ANGLES, CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -166,7 +166,7 @@ class _File:
         self.mass, self.center = p.platform.mass, p.platform.center_of_mass
         self.cube = self.platform * self.platform * self.platform  # inf, where ** would raise
         self.gravity = float(np.linalg.norm(p.gravity))
-        self.gravity_error = gravity_mistakes.likely_mistake(p.gravity)
+        self.gravity_error = gravity_errors.find_gravity_error(p.gravity)
         self.weight = p.carried.mass * self.gravity
         self.force, self.rate = self.six['limits.force_max'], self.six['limits.velocity_max']
         self.friction = p.actuator.coulomb_friction
@@ -254,7 +254,7 @@ def _unlike_earth(error: str, words: str) -> _Of:
 
 def _too_weak(name: str) -> _Of:
     return _Of(name, lambda f: (
-        f.weight > f.six[name].sum() and f.gravity_error != gravity_mistakes.IN_MM), (
+        f.weight > f.six[name].sum() and f.gravity_error != gravity_errors.IN_MM), (
         f'{{texts[{name}]}} N: six such legs cannot carry the platform, {{weight:.3g}} N: in kN?'))
 
 
@@ -295,11 +295,11 @@ _ROTORS: Table[_File] = First(
 
 _LOADS: Table[_File] = (
     First(
-        _Of('gravity', lambda f: f.gravity_error == gravity_mistakes.IN_MM,
+        _Of('gravity', lambda f: f.gravity_error == gravity_errors.IN_MM,
             '{gravity:.6g} m/s^2: four times that of Jupiter: in mm/s^2?'),
         When(lambda f: f.p.base.source != BY_IMU, (
-            _unlike_earth(gravity_mistakes.IN_G, 'in g?'),
-            _unlike_earth(gravity_mistakes.NONE, 'none, as in orbit?')))),
+            _unlike_earth(gravity_errors.IN_G, 'in g?'),
+            _unlike_earth(gravity_errors.NONE, 'none, as in orbit?')))),
     First(
         _Of('payload.mass', lambda f: f.mass * f.gravity <= f.force.sum() < f.weight, (
             '{p[payload.mass]:.3g} kg: six legs with limits.force_max, {texts[limits.force_max]} '
@@ -413,7 +413,7 @@ class _Assembled(_File):
         """Return errors in parameters that the kind of legs has alone."""
         if self.has_wrong_size or self.odd or not self.known:
             return ()
-        loaded = self.p.base.source != BY_IMU and self.gravity_error != gravity_mistakes.IN_MM
+        loaded = self.p.base.source != BY_IMU and self.gravity_error != gravity_errors.IN_MM
         return tuple(self.kind.possible_errors(self.p, AtHome(
             self.home.positions[0], self.home.rotations[0], self.away, home_legs(self.p)['base'],
             self.efforts if loaded else None)))
@@ -536,8 +536,8 @@ _FRAMES: Table[_Assembled] = (
     _At('{platform_name}', lambda f: f.platform - _LARGEST_PLATFORM_RATIO * f.base, (
         '{platform:.3g} m from their center, the {kind.anchors_are} only {base:.3g} m: base and '
         'platform exchanged?')),
-    _At('gravity', lambda f: f.p.base.source == FIXED and gravity_mistakes.likely_mistake(
-        f.p.gravity, f.home) == gravity_mistakes.AWAY, (
+    _At('gravity', lambda f: f.p.base.source == FIXED and gravity_errors.find_gravity_error(
+        f.p.gravity, f.home) == gravity_errors.AWAY, (
         '{texts[gravity]} m/s^2 pulls the platform away from the base: a sign? For a hexapod that '
         'hangs, or whose axes point down, set geometry.platform_side')),
     _At(_PLATFORM, lambda f: f.joints_in_base_frame / f.lengths, (
@@ -584,7 +584,7 @@ def _assembled_errors(f: _File) -> Iterator[PossibleError]:
 
 
 @lru_cache(maxsize=4)  # the replay of many bags asks for each
-def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str, ...]:
+def find_parameter_errors(parameters: Parameters, geometry: bool = True) -> tuple[str, ...]:
     """
     Return possible errors, each in one line: parameter, value, suspected error.
 
@@ -598,7 +598,7 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
         return tuple(lines_of(find_errors(table, _File(parameters))))
 
 
-def mistakes_in_options(
+def find_option_errors(
         p: Parameters, poses: Mapping[str, Sequence[float] | None],
         points: Mapping[str, Sequence[float] | None]) -> Iterator[str]:
     """
@@ -608,7 +608,7 @@ def mistakes_in_options(
     points: X Y Z of each option in the platform frame [m].
     """
     for name, pose in poses.items():
-        if pose is not None and (text := typed_pose_mistake(p, pose)):
+        if pose is not None and (text := find_typed_pose_error(p, pose)):
             yield f'{name}: {listed(np.array(pose), _DIGITS)}: {text}'
     for name, point in points.items():
         if point is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.kinematics.home_pose import Home
 
-# Kinds of mistakes.
+# Kinds of possible errors.
 NONE, IN_G, IN_MM, AWAY = 'none', 'in g', 'in mm/s^2', 'away'
 
 _LARGEST = 100.0  # [m/s^2]; Jupiter has 25
@@ -20,7 +20,7 @@ _ROUND_1 = 0.05  # an accelerometer measures 1 g with a smaller error
 _HANGING = 0.5
 
 
-def likely_mistake(gravity: Array, home: Home | None = None) -> str:
+def find_gravity_error(gravity: Array, home: Home | None = None) -> str:
     """
     Return the kind of the possible error, empty without one.
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 
-"""Possible errors in parameters: no warning for valid hexapods, one for each mistake."""
+"""Possible errors in parameters: no warning for valid hexapods, one for each error."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPl
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of, homes
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
-from stewart_dynamics.mechanics.parameter_mistakes import likely_mistakes
+from stewart_dynamics.mechanics.parameter_errors import find_parameter_errors
 from stewart_dynamics.parameters.table import inertia_matrix, PARAMETERS
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -99,13 +99,13 @@ HEXAPODS = {
 @pytest.mark.parametrize('name', HEXAPODS)
 def test_good_hexapods_give_no_warnings(name: str) -> None:
     expected = ('gravity: 0 m/s^2: none, as in orbit? The earth has 9.80665',)
-    assert likely_mistakes(Parameters(HEXAPODS[name])) == (
+    assert find_parameter_errors(Parameters(HEXAPODS[name])) == (
         expected if name == 'weightless' else ())
 
 
 def test_random_hexapods_give_no_warning() -> None:
     for seed in range(20):
-        assert likely_mistakes(random_parameters(np.random.default_rng(seed))) == ()
+        assert find_parameter_errors(random_parameters(np.random.default_rng(seed))) == ()
 
 
 @pytest.mark.parametrize('power', [2.0, 3.0])
@@ -117,18 +117,19 @@ def test_hexapods_of_any_size_give_no_warning(size: float, power: float) -> None
     found = scaled(PLATFORM, size).replaced({
         name: PLATFORM[name] * size ** exponent for name, exponent in limits.items()
         if power == 3.0 or size <= 1.0 or name != 'limits.force_max'})
-    assert likely_mistakes(found) == ()
+    assert find_parameter_errors(found) == ()
     for seed in range(2):
-        assert likely_mistakes(scaled(
+        assert find_parameter_errors(scaled(
             random_parameters(np.random.default_rng(seed)), 0.3 * size)) == ()
 
 
 def test_lengths_in_mm_throughout_have_no_other_cause() -> None:
     names = [name for name, each in PARAMETERS.items() if each.unit == 'm' and name in
              PLATFORM.given]
-    found = likely_mistakes(PLATFORM.replaced({name: 1e3 * PLATFORM[name] for name in names}))
-    assert all('in mm' in mistake for mistake in found), found
-    assert not any('in g?' in mistake for mistake in found), found
+    found = find_parameter_errors(PLATFORM.replaced({
+        name: 1e3 * PLATFORM[name] for name in names}))
+    assert all('in mm' in error for error in found), found
+    assert not any('in g?' in error for error in found), found
 
 
 # Mistakes: changes of the package's hexapod, and the warnings, word for word
@@ -291,21 +292,21 @@ SEVERAL = {'all joints in mm', 'all joints in mm of a hexapod as long as a stree
            'the base joints in mm', 'one base joint in mm', 'limits in mm'}
 
 
-def test_a_rotor_that_its_motor_cannot_accelerate_so_much_is_no_mistake() -> None:
+def test_a_rotor_that_its_motor_cannot_accelerate_so_much_is_no_possible_error() -> None:
     p = PLATFORM.replaced({
         'actuator.reflected_mass': None, 'actuator.screw_lead': 0.01,
         'drive.motor_inertia': 7.6e-5, 'drive.torque_max': 8.0, 'limits.force_max': 20e3})
-    assert not any('reflected_mass' in each for each in likely_mistakes(p))
+    assert not any('reflected_mass' in each for each in find_parameter_errors(p))
 
 
 @pytest.mark.parametrize('name', SLIPS)
-def test_a_mistake_is_reported_once(name: str) -> None:
+def test_a_possible_error_is_reported_once(name: str) -> None:
     changes, texts = SLIPS[name]
-    found = likely_mistakes(PLATFORM.replaced({
+    found = find_parameter_errors(PLATFORM.replaced({
         name: np.ravel(value) if np.ndim(value) else value for name, value in changes.items()}))
     for text in texts:
-        assert any(text in mistake for mistake in found), found
-    assert all(mistake.isprintable() for mistake in found)
+        assert any(text in error for error in found), found
+    assert all(error.isprintable() for error in found)
     assert len(found) == 1 or name in SEVERAL
     # A wrong unit is not also an order of the joints.
     assert name != 'one base joint in mm' or not any('another order' in each for each in found)
@@ -322,10 +323,10 @@ def test_points_in_the_frame_of_the_base_are_found_at_any_height(
     for changes, name in (
             ({'geometry.platform_joints': TOP + up}, 'geometry.platform_joints'),
             ({'platform.center_of_mass': center + up}, 'platform.center_of_mass')):
-        found = likely_mistakes(PLATFORM.replaced({**limits, **changes}))
+        found = find_parameter_errors(PLATFORM.replaced({**limits, **changes}))
         assert any(each.startswith(f'{name}: ') and 'base' in each for each in found), found
     # The frames of positioning hexapods: all of the base below, home at zero.
-    assert not likely_mistakes(PLATFORM.replaced({
+    assert not find_parameter_errors(PLATFORM.replaced({
         **limits, 'geometry.base_joints': BASE - up}))
 
 
@@ -336,7 +337,7 @@ def test_an_inertia_about_the_origin_of_the_base_is_found_wherever_the_platform_
              "base's origin?")
     for height in (0.0, 0.4 * size, -0.3 * size):
         up = np.array([0.0, 0.0, height])
-        found = likely_mistakes(Parameters({
+        found = find_parameter_errors(Parameters({
             'geometry.base_joints': size * BASE, 'geometry.platform_joints': size * TOP + up,
             'geometry.zero_length': 1.3 * size, 'platform.mass': 150.0 * size ** 3,
             'platform.center_of_mass': size * PLATFORM['platform.center_of_mass'] + up,
@@ -349,10 +350,10 @@ def test_an_inertia_about_the_origin_of_the_base_is_found_wherever_the_platform_
     (26.0, ''), (28.0, 'in g mm^2 or kg mm^2?'), (0.6 / 190.0, ''), (0.6 / 210.0, 'scaled twice')])
 def test_the_radius_of_gyration_has_bounds(gyration: float, words: str) -> None:
     moment = 150.0 * gyration ** 2
-    found = likely_mistakes(PLATFORM.replaced({
+    found = find_parameter_errors(PLATFORM.replaced({
         'platform.inertia': [moment, 0.0, 0.0, moment, 0.0, moment]}))
     for suspected in ('in g mm^2 or kg mm^2?', 'scaled twice'):
-        assert any(suspected in mistake for mistake in found) == (suspected == words), found
+        assert any(suspected in error for error in found) == (suspected == words), found
 
 
 @pytest.mark.parametrize(('by', 'spread'), [
@@ -361,20 +362,20 @@ def test_platform_joints_that_begin_with_another_leg_are_reported(
         by: int, spread: float) -> None:
     platform = np.roll(ring(0.6, spread, 60.0), 1, axis=0)
     right = hexapod(ring(0.9, 12.0), platform, 150.0, 20.0, geometry__zero_length=1.2)
-    assert likely_mistakes(Parameters(right)) == ()
-    (mistake,) = likely_mistakes(Parameters(
+    assert find_parameter_errors(Parameters(right)) == ()
+    (error,) = find_parameter_errors(Parameters(
         {**right, 'geometry.platform_joints': np.roll(platform, by, axis=0).ravel()}))
-    assert mistake.endswith('the joints in another order?')
+    assert error.endswith('the joints in another order?')
 
 
-def test_drives_without_reflected_mass_and_slow_ones_are_no_mistakes() -> None:
+def test_drives_without_reflected_mass_and_slow_ones_are_no_possible_errors() -> None:
     for change in ({'actuator.reflected_mass': 0.0},  # hydraulic
                    # a positioner of 0.5 mm/s, a screw of 1 mm
                    {'actuator.reflected_mass': 39.0, 'limits.velocity_max': 5e-4},
                    {'actuator.reflected_mass': None, 'limits.velocity_max': None,
                     'limits.force_max': None, 'actuator.viscous_friction': None,
                     'actuator.coulomb_friction': None}):
-        assert likely_mistakes(PLATFORM.replaced(change)) == ()
+        assert find_parameter_errors(PLATFORM.replaced(change)) == ()
 
 
 def test_the_figure_at_home_is_that_of_the_runtime_path() -> None:
@@ -383,10 +384,10 @@ def test_the_figure_at_home_is_that_of_the_runtime_path() -> None:
         'singularity.warn_condition': 10.0, 'singularity.stop_condition': 12.0,
         'geometry.zero_length': 1.3,
         'limits.length_min': (), 'limits.length_max': ()})
-    (mistake,) = likely_mistakes(turned)
-    assert mistake.startswith(
+    (error,) = find_parameter_errors(turned)
+    assert error.startswith(
         'geometry: nearly singular at home (the axes parallel, a mean leg of 1.3 m)')
-    figure = float(mistake.split('condition number is ')[1].split(',')[0])
+    figure = float(error.split('condition number is ')[1].split(',')[0])
     # At home the mean leg has the zero length: found again by the lengths themselves.
     platform = StewartPlatform(turned)
     heights = np.linspace(0.1, 2.0, 19001)
@@ -403,10 +404,10 @@ def test_a_home_that_is_turned_is_found_by_the_limits() -> None:
     platform = np.roll(there, 1, axis=0) @ from_euler([0.0, 0.0, -np.pi / 2.0]).T
     good = hexapod(ring(0.9, 12.0), platform, 150.0, 20.0, limits__length_min=1.15,
                    limits__length_max=1.25)
-    assert likely_mistakes(Parameters(good)) == ()
-    (mistake,) = likely_mistakes(Parameters(
+    assert find_parameter_errors(Parameters(good)) == ()
+    (error,) = find_parameter_errors(Parameters(
         {**good, 'limits.length_min': (), 'limits.length_max': ()}))
-    assert 'singular at home (the axes parallel, at any height)' in mistake
+    assert 'singular at home (the axes parallel, at any height)' in error
 
 
 @pytest.mark.parametrize(('changes', 'side'), [
@@ -465,7 +466,7 @@ NUMBERS = st.one_of(st.floats(-3.0, 3.0), st.floats(allow_nan=False, allow_infin
            'singularity.characteristic_length', 'singularity.stop_condition']), NUMBERS,
            max_size=4), st.floats(1e-300, 1e300))
 @np.errstate(all='ignore')
-def test_likely_mistakes_of_any_valid_parameters_are_short_lines(
+def test_possible_errors_of_any_valid_parameters_are_short_lines(
         base: list[float], platform: list[float], changes: dict[str, float],
         moment: float) -> None:
     try:
@@ -475,15 +476,15 @@ def test_likely_mistakes_of_any_valid_parameters_are_short_lines(
             **changes})
     except ParameterError:
         assume(False)
-    for mistake in likely_mistakes(parameters):
-        assert mistake.isprintable()
-        assert len(mistake) < 500
+    for error in find_parameter_errors(parameters):
+        assert error.isprintable()
+        assert len(error) < 500
 
 
 def test_the_check_of_a_payload_reports_what_the_whole_check_does() -> None:
     p = PLATFORM.replaced({'platform.inertia': [1e9, 0.0, 0.0, 1e9, 0.0, 1e9],
                            'limits.length_max': 0.165, 'limits.length_min': ()})
-    said, of_payload = likely_mistakes(p), likely_mistakes(p, geometry=False)
+    said, of_payload = find_parameter_errors(p), find_parameter_errors(p, geometry=False)
     assert len(said) > len(of_payload) == 1
     assert said[:1] == of_payload
 
@@ -561,27 +562,27 @@ def test_irregular_hexapods_have_no_odd_joint():
         assert [odd_joint(p[table]) for table in TABLES] == [None, None]
 
 
-def test_the_likely_mistake_names_the_leg_and_the_place():
+def test_the_possible_error_names_the_leg_and_the_place():
     p = PLATFORM
     joints = p['geometry.platform_joints'].copy()
     joints[2, 1] *= -1.0
-    mistakes = StewartPlatform(p.replaced({'geometry.platform_joints': joints})).check()
-    assert len(mistakes) == 1
-    assert mistakes[0].startswith('geometry.platform_joints: leg_')
-    assert 'repeat after a third of a turn' in mistakes[0]
+    errors = StewartPlatform(p.replaced({'geometry.platform_joints': joints})).check()
+    assert len(errors) == 1
+    assert errors[0].startswith('geometry.platform_joints: leg_')
+    assert 'repeat after a third of a turn' in errors[0]
 
 
 def test_legs_that_share_a_joint_or_are_all_cylinder_are_reported() -> None:
     shape = {'legs.cylinder.radius': 0.02, 'legs.piston.radius': 0.01, 'legs.cylinder.length': 0.1,
              'limits.leg_clearance_min': 0.005}
     p = PLATFORM.replaced(shape)
-    assert likely_mistakes(p) == likely_mistakes(PLATFORM)
+    assert find_parameter_errors(p) == find_parameter_errors(PLATFORM)
     joints = p['geometry.base_joints'].copy()
     joints[1] = joints[0]
-    found = likely_mistakes(p.replaced({'geometry.base_joints': joints.ravel()}))
+    found = find_parameter_errors(p.replaced({'geometry.base_joints': joints.ravel()}))
     assert any('limits.leg_clearance_min: 0.005 m, but leg_1 and leg_2 have the same place in '
                'geometry.base_joints' in each for each in found)
-    found = likely_mistakes(p.replaced({'legs.cylinder.length': 400.0}))
+    found = find_parameter_errors(p.replaced({'legs.cylinder.length': 400.0}))
     assert any('legs.cylinder.length: 400 m, but leg_1 can be as short as' in each
                for each in found)
 
@@ -596,26 +597,26 @@ GOOD_DRIVE: dict[str, Any] = {
     'drive.torque_speed': [0.0, 6.0, 500.0, 6.0, 700.0, 4.0]}
 
 
-def drive_mistakes(**changes: Any) -> tuple[str, ...]:
-    return likely_mistakes(PLATFORM.replaced({**GOOD_DRIVE, **{
+def drive_errors(**changes: Any) -> tuple[str, ...]:
+    return find_parameter_errors(PLATFORM.replaced({**GOOD_DRIVE, **{
         name.replace('__', '.'): value for name, value in changes.items()}}))
 
 
 def test_a_good_drive_gives_no_warning() -> None:
-    assert drive_mistakes() == ()
-    assert drive_mistakes(limits__velocity_max=None, limits__force_max=None) == ()
-    assert drive_mistakes(drive__speed_max=None, drive__torque_speed=None) == ()
-    assert drive_mistakes(drive__torque_max=None, drive__torque_continuous=None) == ()
-    assert drive_mistakes(drive__gear_ratio=1.0, actuator__screw_lead=0.005) == ()
+    assert drive_errors() == ()
+    assert drive_errors(limits__velocity_max=None, limits__force_max=None) == ()
+    assert drive_errors(drive__speed_max=None, drive__torque_speed=None) == ()
+    assert drive_errors(drive__torque_max=None, drive__torque_continuous=None) == ()
+    assert drive_errors(drive__gear_ratio=1.0, actuator__screw_lead=0.005) == ()
     # the thrust rating of the cylinder under its own name, or of a rotor that weighs little
-    assert drive_mistakes(limits__force_max=None, limits__joint_force_max=1500.0) == ()
-    assert drive_mistakes(limits__force_max=1500.0, limits__joint_force_max=1500.0) == ()
-    assert drive_mistakes(limits__force_max=1500.0, drive__motor_inertia=2e-6,
-                          drive__screw_inertia=0.0) == ()
+    assert drive_errors(limits__force_max=None, limits__joint_force_max=1500.0) == ()
+    assert drive_errors(limits__force_max=1500.0, limits__joint_force_max=1500.0) == ()
+    assert drive_errors(limits__force_max=1500.0, drive__motor_inertia=2e-6,
+                        drive__screw_inertia=0.0) == ()
     # the published machine: 8.2 N m, lead 5 mm, 3 : 1, for a slower and heavier hexapod
-    assert drive_mistakes(drive__gear_ratio=3.0, actuator__screw_lead=0.005, drive__torque_max=8.2,
-                          drive__motor_inertia=1.37e-4, drive__torque_speed=None,
-                          limits__velocity_max=0.16, limits__force_max=25e3) == ()
+    assert drive_errors(drive__gear_ratio=3.0, actuator__screw_lead=0.005, drive__torque_max=8.2,
+                        drive__motor_inertia=1.37e-4, drive__torque_speed=None,
+                        limits__velocity_max=0.16, limits__force_max=25e3) == ()
 
 
 @pytest.mark.parametrize(('changes', 'begin', 'end'), [
@@ -645,8 +646,9 @@ def test_a_good_drive_gives_no_warning() -> None:
     ({'limits__force_max': 1500.0}, 'limits.force_max: 1.5e+03 N: the motors can push ',
      'It is limits.joint_force_max'),
 ])
-def test_a_mistake_in_a_drive_is_reported(changes: dict[str, Any], begin: str, end: str) -> None:
-    found = drive_mistakes(**changes)
+def test_a_possible_error_in_a_drive_is_reported(
+        changes: dict[str, Any], begin: str, end: str) -> None:
+    found = drive_errors(**changes)
     about = [line for line in found if line.startswith(begin)]
     assert about, found
     assert about[0].endswith(end) and all(len(line) < 400 for line in found)
@@ -658,8 +660,8 @@ HEAT = {'drive__torque_constant': 0.5, 'drive__resistance': 0.8, 'drive__thermal
 
 
 def test_a_motor_with_its_heat_gives_no_warning() -> None:
-    assert drive_mistakes(**HEAT) == ()
-    assert drive_mistakes(**HEAT, drive__back_driving_efficiency=0.9) == ()
+    assert drive_errors(**HEAT) == ()
+    assert drive_errors(**HEAT, drive__back_driving_efficiency=0.9) == ()
 
 
 @pytest.mark.parametrize(('changes', 'begin'), [
@@ -676,7 +678,7 @@ def test_a_motor_with_its_heat_gives_no_warning() -> None:
 ])
 def test_data_of_a_motor_that_no_motor_has_are_reported(changes: dict[str, Any], begin: str,
                                                         ) -> None:
-    found = drive_mistakes(**changes)
+    found = drive_errors(**changes)
     assert len(found) == 1
     assert found[0].startswith(begin)
 
@@ -686,7 +688,7 @@ def test_data_of_a_motor_that_no_motor_has_are_reported(changes: dict[str, Any],
     ({'limits.platform_joint_angle_max': math.radians(1.0)}, 'converted from degrees twice?')])
 def test_limits_that_the_strokes_contradict_are_reported(changes: dict[str, Any], end: str,
                                                          ) -> None:
-    found = likely_mistakes(PLATFORM.replaced(changes))
+    found = find_parameter_errors(PLATFORM.replaced(changes))
     assert len(found) == 1
     assert found[0].endswith(end)
 
@@ -703,11 +705,11 @@ def moved(base: float, platform: float, center: float, scale: float = 1.0) -> Pa
 
 @pytest.mark.parametrize('center', [0.0, 1e-18, -1e-18, 0.05, -0.05])
 @pytest.mark.parametrize('offset', [0.0, 0.02, -0.1, 1e-18])
-def test_a_base_frame_at_the_home_of_the_platform_is_no_mistake(center: float, offset: float,
-                                                                ) -> None:
+def test_a_base_frame_at_the_home_of_the_platform_is_no_possible_error(
+        center: float, offset: float) -> None:
     """As positioning hexapods have it: the base joints below, home at zero."""
     home = home_of(PLATFORM)
     middle = PLATFORM['geometry.base_joints'].mean(axis=0)[2]
     joints = PLATFORM['geometry.platform_joints'].mean(axis=0)[2]
     p = moved(offset - middle - float(home.heights[0]), offset - joints, center)
-    assert likely_mistakes(p) == ()
+    assert find_parameter_errors(p) == ()

@@ -69,19 +69,19 @@ class PoseByAngles(NamedTuple):
     advice: str  # the option by which the angles are read in degrees
 
 
-def typed_pose_mistake(parameters: Parameters, pose: Sequence[float]) -> str:
+def find_typed_pose_error(parameters: Parameters, pose: Sequence[float]) -> str:
     """Return the possible error in a pose X Y Z ALPHA BETA GAMMA as a user types it."""
     angles = np.array(pose[3:])
-    return pose_mistake(parameters, np.append(pose[:3], from_euler(angles)), angles=Angles(
+    return find_pose_error(parameters, np.append(pose[:3], from_euler(angles)), angles=Angles(
         float(np.abs(angles).max()), None, from_euler(np.radians(angles))))
 
 
-def pose_mistake(parameters: Parameters, motion: Sequence[float] | Array,
-                 first: bool = True, angles: Angles | None = None) -> str:
+def find_pose_error(parameters: Parameters, motion: Sequence[float] | Array,
+                    first: bool = True, angles: Angles | None = None) -> str:
     """
     Return the possible error in the pose of a row of motion; empty without one.
 
-    first: whether the motion begins there; on the other side of a singularity is a mistake then.
+    first: whether the motion begins there; on the other side of a singularity is an error then.
     angles: of the rotation, which may be in degrees.
 
     Without a home pose only a position in mm is named.
