@@ -399,36 +399,30 @@ def test_all_poses_are_used_where_none_is_held_out_and_some_noise_is_needed(
         calibrate(HEXAPOD, lengths, seen, noise=(0.0, 0.0, 0.0))
 
 
-@pytest.mark.parametrize(('what', 'words'), [
-    ('play', 'play, a loose joint or encoder: leg_3 (residuals of'),
-    ('deflection', 'residuals follow the static forces of the legs, from deflection: all legs'),
-    ('drift', 'residuals drift from the first pose to the last: leg_3'),
-    ('scale', 'positions off by scale, from the lead of the screw or the encoder: leg_3 (+0.2'),
-    ('scale of all legs', 'positions off by scale, from the lead of the screw or the encoder: all '
-     'legs alike (+0.99%)'),
-    ('scale of the device', 'positions of the device off by scale, from its calibration or its '
-     'target: all legs alike (+0.99%)'),
-    ('fixed', 'the fixed values are not those of the hexapod: '),
-    ('noise', 'times the noise that was given')])
-def test_a_lack_of_fit_is_named(what: str, words: str) -> None:
+LEG_3 = np.eye(6)[2]
+
+
+@pytest.mark.parametrize(('change', 'words'), [
+    (lambda q, _: {'lengths': q + LEG_3 * np.random.default_rng(1).choice([1e-4, -1e-4], (60, 1))},
+     'play, a loose joint or encoder: leg_3 (residuals of'),
+    (lambda q, seen: {
+        'lengths': q + HEXAPOD.inverse_dynamics(Motion.from_pose(seen)).forces / 4e6},
+     'residuals follow the static forces of the legs, from deflection: all legs'),
+    (lambda q, _: {'lengths': q + LEG_3 * np.linspace(0.0, 1e-4, 60)[:, None]},
+     'residuals drift from the first pose to the last: leg_3'),
+    (lambda q, _: {'lengths': q * (1.0 + 0.002 * LEG_3)},
+     'positions off by scale, from the lead of the screw or the encoder: leg_3 (+0.2'),
+    (lambda q, _: {'lengths': 1.01 * q, 'accept_mistakes': True},
+     'positions off by scale, from the lead of the screw or the encoder: all legs alike (+0.99%)'),
+    (lambda _, seen: {'poses': scaled(seen, 1.01), 'accept_mistakes': True},
+     'positions of the device off by scale, from its calibration or its target: all legs alike '
+     '(+0.99%)'),
+    (lambda *_: {'fixed': ['zero_length']}, 'the fixed values are not those of the hexapod: '),
+    (lambda *_: {'noise': Noise(1e-6, 5e-6, 5e-6)}, 'times the noise that was given')])
+def test_a_lack_of_fit_is_named(change: Callable[..., dict[str, Any]], words: str) -> None:
     rng = np.random.default_rng(8)
-    noise = Noise(2e-6, 1e-5, 1e-5)
-    lengths, seen = measured(rng, true_values(rng), random_poses(rng, 60), noise)
-    if what == 'play':
-        lengths[:, 2] += np.where(rng.random(60) < 0.5, 1e-4, -1e-4)
-    if what == 'scale':
-        lengths[:, 2] *= 1.002
-    if what == 'scale of all legs':
-        lengths *= 1.01
-    if what == 'scale of the device':
-        seen = Pose(1.01 * seen.position, seen.rotation)
-    if what == 'deflection':
-        lengths += HEXAPOD.inverse_dynamics(Motion.from_pose(seen)).forces / 4e6
-    if what == 'drift':
-        lengths[:, 2] += np.linspace(0.0, 1e-4, 60)
-    found = calibrate(HEXAPOD, lengths, seen, fixed=['zero_length'] if what == 'fixed' else [],
-                      noise=Noise(1e-6, 5e-6, 5e-6) if what == 'noise' else None,
-                      accept_mistakes='scale of' in what)
+    lengths, seen = measured(rng, true_values(rng), random_poses(rng, 60), Noise(2e-6, 1e-5, 1e-5))
+    found = calibrate(HEXAPOD, **{'lengths': lengths, 'poses': seen, **change(lengths, seen)})
     assert words in found.lack_of_fit[0].text
 
 
