@@ -13,7 +13,7 @@ motion is followed with either file.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import json
 from pathlib import Path
 import shutil
@@ -31,7 +31,9 @@ import rclpy
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics.executables import executable
+from stewart_dynamics.identification.identification_record import IdentificationResult
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.records import record_of
 from stewart_dynamics.whole_file import write_json
 
 matplotlib.use('Agg')
@@ -87,23 +89,22 @@ def write_bag(folder: Path, states: Sequence[bytes]) -> int:
     return len(stamped)
 
 
-def values(document: Mapping[str, Any], true: Parameters) -> list[Value]:
+def values(document: IdentificationResult, true: Parameters) -> list[Value]:
     """Return the identified numbers, of legs the one that is farthest from the truth."""
     found: dict[str, Value] = {}
-    for each in document['parameters']:
-        name, _, last = each['name'].rpartition('.')
+    for each in document.parameters:
+        name, _, last = each.name.rpartition('.')
         if name.startswith('actuator.'):
             truth = true[name][true.joints.index(last)]
         elif name == 'platform':
-            name, truth = each['name'], true.platform.mass
+            name, truth = each.name, true.platform.mass
         else:
             axes = {'platform.center_of_mass': ('x', 'y', 'z'),
                     'platform.inertia': ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')}[name]
             truth = true[name][axes.index(last)]
-            name = each['name']
-        low, high = each['interval'] or (each['value'], each['value'])
-        value = Value(name, each['unit'], each['file'], each['value'], 0.5 * (high - low),
-                      float(truth))
+            name = each.name
+        low, high = each.interval or (each.value, each.value)
+        value = Value(name, each.unit, each.file, each.value, 0.5 * (high - low), float(truth))
         worst = found.get(name, value)
         if abs(value.after - value.true) >= abs(worst.after - worst.true):
             found[name] = value
@@ -190,7 +191,7 @@ def main() -> None:
                     True, TRUE, progress.reached, Recorder(), hexapod)))
         document = json.loads((folder / 'identified' / 'identification.json').read_text(
             encoding='utf-8'))
-        numbers = values(document, true)
+        numbers = values(record_of(IdentificationResult, document, true.leg_kind), true)
         print(f'\n{many} measurements of the legs in {options.recorded:g} s, with noise of '
               f'{NOISE["noise.force"]:g} N; of six legs the worst\n\n{table(numbers, runs)}\n')
         draw(folder / 'identify.png', runs)

@@ -6,14 +6,16 @@ Records: results with the keys, types and meanings of the JSON documents that pr
 
 A key that is named by the quantities of a kind of legs has braces,
 ``'{effort}_peak_{effort_unit}'``: ``of_kind`` gives the record of a kind, in which it is
-``force_peak_n`` or ``torque_peak_n_m``.
+``force_peak_n`` or ``torque_peak_n_m``. A key that is UNSET is not in the document.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cache
-from typing import Annotated, Any, ClassVar, get_args, get_origin, TYPE_CHECKING, TypeVar
+from types import UnionType
+from typing import (
+    Annotated, Any, ClassVar, get_args, get_origin, TYPE_CHECKING, TypeVar, Union)
 
 from msgspec import convert, defstruct, field, Meta, NODEFAULT, Struct
 from msgspec.structs import fields
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 R = TypeVar('R', bound='Record')
 Number = float | None
 """A number; None: not known, or not finite."""
+Value = bool | int | float | str | list[Any] | None
+"""A value of a parameter or option."""
 
 
 class Record(Struct):
@@ -72,7 +76,8 @@ def of_kind(record: type[R], kind: LegKind) -> type[R]:
 def _of_kind(record: type[Record], kind: LegKind) -> Any:
     words = {name: text for quantity in ('position', 'rate', 'effort')
              for each in [getattr(kind, quantity)]
-             for name, text in ((quantity, each.name), (f'{quantity}_unit', unit_key(each.unit)))}
+             for name, text in ((quantity, each.name), (f'{quantity}s', each.field),
+                                (f'{quantity}_unit', unit_key(each.unit)))}
     found: list[Any] = []
     more = list(record.more_fields(kind))
     differs = bool(more)
@@ -100,8 +105,8 @@ def _type_of_kind(kind_of_value: Any, kind: LegKind) -> Any:
         return Annotated[(_type_of_kind(arguments[0], kind), *arguments[1:])]
     if origin in (list, dict):
         return origin[tuple(_type_of_kind(each, kind) for each in arguments)]
-    if len(arguments) == 2 and arguments[1] is type(None):
-        return _type_of_kind(arguments[0], kind) | None
+    if origin in (Union, UnionType):
+        return Union[tuple(_type_of_kind(each, kind) for each in arguments)]
     return kind_of_value
 
 

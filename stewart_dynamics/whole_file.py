@@ -211,12 +211,15 @@ def to_json(document: Any, indent: int | None = None) -> str:
 
 def _by_keys(document: Any) -> dict[str, Any]:
     """Return the values of a record by their keys."""
+    from msgspec import UNSET
+
     from stewart_dynamics.records import Record
 
     if not isinstance(document, Record):
         raise TypeError(f'Object of type {type(document).__name__} is not JSON serializable')
-    return {key: getattr(document, name) for key, name in zip(
-        document.keys(), document.__struct_fields__, strict=True)}
+    return {key: value for key, name in zip(
+        document.keys(), document.__struct_fields__, strict=True)
+        if (value := getattr(document, name)) is not UNSET}
 
 
 def plain(document: Any) -> Any:

@@ -464,18 +464,18 @@ def identified(bags: Sequence[Recorded], truth: Truth, given: Parameters | None 
             result = document(work.result(), chosen)
     except StewartError as exc:
         return Outcome((), ('rejected',), (str(exc),))
-    found = [(each['what'], each['text']) for each in result['likely_mistakes']]
-    if lack := result['lack_of_fit']:
-        found.append((lack['cause'], lack['text']))
-    of_bags = [text for bag in result['bags'] for text in bag['notices']]
+    found = [(each.what, each.text) for each in result.likely_mistakes]
+    if lack := result.lack_of_fit:
+        found.append((lack.cause, lack.text))
+    of_bags = [text for bag in result.bags for text in bag.notices]
     values = truth.values()
     return Outcome(
-        tuple(Judged(each['name'], each['value'], np.diff(each['interval'])[0] / 2.0 if each[
-            'interval'] else np.nan, each['state'] == 'identified', values[each['name']],
-            each['file_deviation'])
-            for each in (*result['parameters'], *result.get('base_parameters', ()))),
+        tuple(Judged(each.name, each.value, np.diff(each.interval)[0] / 2.0 if each.interval
+                     else np.nan, each.state == 'identified', values[each.name],
+                     each.file_deviation)
+              for each in (*result.parameters, *(result.base_parameters or ()))),
         tuple(what for what, _ in found), (*(text for _, text in found), *of_bags),
-        result['bags'][0]['delay_s'] or np.nan)
+        result.bags[0].delay_s or np.nan)
 
 
 def history_of(given: Recorded, motion: Motion, p: Parameters = GIVEN) -> LegHistory:

@@ -394,15 +394,15 @@ def test_a_parameter_that_a_lack_of_fit_hides_is_no_combination_by_itself() -> N
     kinds = 'friction', 'reflected_inertia'
     found = found_in(moved(6), CRANKS, *kinds)
     result = document(found, IdentificationOptions(kinds=kinds))
-    assert result['lack_of_fit'] is not None
-    states = {each['name']: each['state'] for each in result['parameters']}
+    assert result.lack_of_fit is not None
+    states = {each.name: each.state for each in result.parameters}
     assert {states[f'actuator.reflected_inertia.leg_{leg}'] for leg in range(1, 7)} == {
         'not_identifiable'}
-    errors = {each['name']: each['standard_error'] for each in result['parameters']}
-    for each in result['combinations']:
-        assert len(each['parameters']) > 1
-        assert each['standard_error'] <= sum(abs(c) * errors[name] for c, name in zip(
-            each['coefficients'], each['parameters'], strict=True)) * (1.0 + 1e-9)
+    errors = {each.name: each.standard_error for each in result.parameters}
+    for each in result.combinations:
+        assert len(each.parameters) > 1
+        assert each.standard_error <= sum(abs(c) * errors[name] for c, name in zip(
+            each.coefficients, each.parameters, strict=True)) * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize('seed', few(range(3), 1))

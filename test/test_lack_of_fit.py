@@ -78,7 +78,7 @@ def test_a_wrong_model_is_noticed_and_its_cause_named(cause: str) -> None:
     assert found.lack_of_fit is not None
     assert found.lack_of_fit.cause in right
     result = document(found, IdentificationOptions())
-    assert result['lack_of_fit']['cause'] in right
+    assert result.lack_of_fit.cause in right
     assert result_text(result).startswith('LACK OF FIT: the residuals are more than noise: likely')
     if cause in ('saturation', 'two payloads in two bags', 'payload of 2 to 6 kg drops'):
         return  # true values do not hold for the whole recording
@@ -86,8 +86,8 @@ def test_a_wrong_model_is_noticed_and_its_cause_named(cause: str) -> None:
     half = TWO_SIDED * errors_of(found)
     narrow, wide = off < half, half + found.lack_of_fit.shifts[found.unknowns.asked]
     assert np.mean(off < wide) >= max(0.8, narrow.mean())
-    assert result['lack_of_fit']['intervals'] == 'widened'
-    given = np.array([each['interval'] for each in result['parameters']])
+    assert result.lack_of_fit.intervals == 'widened'
+    given = np.array([each.interval for each in result.parameters])
     np.testing.assert_allclose(np.diff(given)[:, 0], 2.0 * wide)
 
 
@@ -153,7 +153,7 @@ def test_short_recordings_are_not_tested(pieces: int, monkeypatch: pytest.Monkey
         found = of_pieces(bag)
         assert (found.tested, found.lack_of_fit) == (False, None)
         result = document(found, IdentificationOptions())
-        assert (result['tested_for_lack_of_fit'], result['lack_of_fit']) == (False, None)
+        assert (result.tested_for_lack_of_fit, result.lack_of_fit) == (False, None)
         assert result_text(result).startswith('not tested for a lack of fit: what can be used')
 
 
@@ -171,8 +171,8 @@ def test_pieces_at_rest_before_a_motion_are_no_lack_of_fit(
     for still in (held, standing(3.0, moving)):
         found = of_pieces([still, moving])
         assert (found.tested, found.lack_of_fit, found.likely) == (True, None, ())
-        (bag,) = document(found, IdentificationOptions())['bags']
-        assert bag['delay_s'] == pytest.approx(delay, abs=2e-4)
+        (bag,) = document(found, IdentificationOptions()).bags
+        assert bag.delay_s == pytest.approx(delay, abs=2e-4)
         off = np.abs(found.fit.values[found.unknowns.asked] - start_of(true))
         assert np.mean(off < TWO_SIDED * errors_of(found)) > 0.8
 
@@ -229,8 +229,8 @@ def test_delays_of_the_efforts_up_to_a_tenth_of_a_second_are_found(
     case = Case(true_hexapod(2))
     found = identify(simulated(case, 2))
     assert (found.likely, found.lack_of_fit) == ((), None)
-    (bag,) = document(found, IdentificationOptions())['bags']
-    assert bag['delay_s'] == pytest.approx(delay, abs=2e-4)
+    (bag,) = document(found, IdentificationOptions()).bags
+    assert bag.delay_s == pytest.approx(delay, abs=2e-4)
     off = np.abs(found.fit.values[found.unknowns.asked] - start_of(case.true))
     assert np.mean(off < TWO_SIDED * errors_of(found)) > 0.8
 

@@ -52,14 +52,17 @@ def tables(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 def test_generated_tables_are_current(tables: ModuleType) -> None:
     pages = tables.pages()
     assert {path.relative_to(ROOT).as_posix() for path in pages} == {
-        'benchmarks/README.md', 'docs/cranks.md', 'docs/faults.md', 'docs/identify_from_bags.md',
-        'docs/node.md', 'docs/motion_cueing.md', 'docs/parameters.md', 'docs/simulator.md',
+        'benchmarks/README.md', 'docs/calibration.md', 'docs/cranks.md', 'docs/faults.md',
+        'docs/identification.md', 'docs/identify_from_bags.md', 'docs/node.md',
+        'docs/motion_cueing.md', 'docs/parameters.md', 'docs/simulator.md',
         'docs/summary.md', 'security/policy.xml'}
     for path, own in pages.items():
         text = path.read_text(encoding='utf-8')
         assert tables.generated(text, own) == text, 'run: python docs/figures/tables.py'
     assert tables.SCHEMA_FILE.read_text(encoding='utf-8') == tables.schema_text()
-    assert tables.SUMMARY_SCHEMA.read_text(encoding='utf-8') == tables.summary_schema()
+    for name, record in tables.DOCUMENTS.items():
+        assert (ROOT / 'config' / name).read_text(encoding='utf-8') == tables.document_schema(
+            record)
 
 
 def test_thresholds_in_tables_of_faults_are_those_of_the_code() -> None:

@@ -18,12 +18,16 @@ from itertools import groupby
 import json
 import math
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, get_args, get_origin, Union
 
+from msgspec import UnsetType
 from msgspec.json import schema_components
 from msgspec.structs import fields
+from stewart_dynamics.calibration.calibration_record import CalibrationResult
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.cueing.cueing_result import CueingResult
+from stewart_dynamics.identification.identification_record import IdentificationResult
 from stewart_dynamics.legs import CRANK, KINDS
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
@@ -44,7 +48,11 @@ import yaml
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 SCHEMA_FILE = ROOT / 'config' / SCHEMA
-SUMMARY_SCHEMA = ROOT / 'config' / 'summary.schema.json'
+# Schemas in config/ of the documents that programs write, and their records.
+DOCUMENTS: dict[str, type[Record]] = {
+    'summary.schema.json': BagSummary, 'cueing.schema.json': CueingResult,
+    'identification.schema.json': IdentificationResult,
+    'calibration.schema.json': CalibrationResult}
 CONTROLLER_PARAMETERS = (ROOT / 'ros2_control' / 'stewart_dynamics_controller' / 'src'
                          / 'stewart_dynamics_controller_parameters.yaml')
 HEAD = '| name | type | unit | default | meaning |\n| --- | --- | --- | --- | --- |\n'
@@ -367,45 +375,55 @@ def figures_of(results: Sequence[Measured]) -> str:
         for what, words, page, cells in results)])
 
 
-def summary_schema() -> str:
-    """Return the JSON schema of summary.json, of hexapods with each kind of legs."""
+def document_schema(record: type[Record]) -> str:
+    """Return the JSON schema of a document, of hexapods with each kind of legs."""
     kinds, records = schema_components(
-        [of_kind(BagSummary, kind) for kind in KINDS], ref_template='#/$defs/{name}')
+        list(dict.fromkeys(of_kind(record, kind) for kind in KINDS)),
+        ref_template='#/$defs/{name}')
     return json.dumps({'anyOf': kinds, '$defs': records}, indent=1) + '\n'
 
 
 def document_keys(record: type[Record], *names: str) -> str:
     """Return the table of keys of a document, with the keys in them; without names of all."""
     listed = {each.name: each for each in fields(of_kind(record, KINDS[0]))}
+    places: dict[type[Record], str] = {}
     return '\n'.join(['| key | type | meaning |', '| --- | --- | --- |', *(
-        row for name in names or listed for row in _key_rows(name, listed[name].type))])
+        row for name in names or listed for row in _key_rows(name, listed[name].type, places))])
 
 
-def _key_rows(key: str, kind: Any) -> Iterator[str]:
-    """Yield the row of a key, unless it has no meaning of its own, and those of the keys in it."""
+def _key_rows(key: str, kind: Any, places: dict[type[Record], str]) -> Iterator[str]:
+    """
+    Yield the row of a key, unless it has no meaning of its own, and those of the keys in it.
+
+    places: where the keys of each record are listed; they are listed once.
+    """
     meaning = ''
     if get_origin(kind) is Annotated:
         kind, meta = get_args(kind)
         meaning = meta.description
     inner, place, names = kind, key, iter(('NAME', 'SOURCE'))
-    while get_origin(inner) in (dict, list) or type(None) in get_args(inner):
+    while get_origin(inner) in (dict, list) or {type(None), UnsetType} & {*get_args(inner)}:
         if get_origin(inner) is list:
             place += '[]'
         elif get_origin(inner) is dict:
             place += f'.{next(names)}'
         inner = get_args(inner)[-1 if get_origin(inner) is dict else 0]
     of_record = _is_record(inner)
-    if meaning or not of_record:
-        yield f'| `{key}` | {_type_words(kind)} | {meaning} |'
+    known = of_record and inner in places
+    if meaning or known or not of_record:
+        same = f', keys as in `{places[inner]}`' if known else ''
+        yield f'| `{key}` | {_type_words(kind)}{same} | {meaning} |'
+    if of_record:
+        places.setdefault(inner, place)
     listed: set[str] = set()
-    for each in fields(inner) if of_record else ():
+    for each in fields(inner) if of_record and not known else ():
         # Keys with the same keys in them stand once, by the name of their record.
         together = _is_record(each.type) and sum(
             other.type is each.type for other in fields(inner)) > 1
         name = (each.type.__name__.removesuffix('Response').upper() if together
                 else each.encode_name)
         if name not in listed:
-            yield from _key_rows(f'{place}.{name}', each.type)
+            yield from _key_rows(f'{place}.{name}', each.type, places)
         listed.add(name)
 
 
@@ -418,8 +436,11 @@ def _type_words(kind: Any) -> str:
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return _type_words(arguments[0])
-    if type(None) in arguments:
-        return f'{_type_words(arguments[0])} or null' if len(arguments) == 2 else 'value'
+    if origin in (Union, UnionType):
+        of_value = [each for each in arguments if each not in (type(None), UnsetType)]
+        return (_type_words(of_value[0]) if len(of_value) == 1 else 'value') + (
+            ' or null' if len(of_value) == 1 and type(None) in arguments else '') + (
+            ', may be missing' if UnsetType in arguments else '')
     if origin is dict:
         return f'name: {_type_words(arguments[1])}'
     if origin is list:
@@ -452,6 +473,10 @@ def pages() -> dict[Path, dict[str, str]]:
                 name: parameter for name, parameter in Parameters.table.items()
                 if name.startswith('cueing.')}),
             'keys of cueing.json': document_keys(CueingResult)},
+        ROOT / 'docs' / 'identification.md': {
+            'keys of identification.json': document_keys(IdentificationResult)},
+        ROOT / 'docs' / 'calibration.md': {
+            'keys of calibration.json': document_keys(CalibrationResult)},
         ROOT / 'docs' / 'cranks.md': {
             'parameters of cranks': rows({
                 name: parameter for name, parameter in Parameters.table.items()
@@ -486,8 +511,10 @@ def main() -> None:
         print(f'{page.relative_to(ROOT)}: {", ".join(tables)}')
     CONTROLLER_PARAMETERS.write_text(controller_parameters(), encoding='utf-8')
     SCHEMA_FILE.write_text(schema_text(), encoding='utf-8')
-    SUMMARY_SCHEMA.write_text(summary_schema(), encoding='utf-8')
-    for path in (CONTROLLER_PARAMETERS, SCHEMA_FILE, SUMMARY_SCHEMA):
+    for name, record in DOCUMENTS.items():
+        (ROOT / 'config' / name).write_text(document_schema(record), encoding='utf-8')
+    for path in (CONTROLLER_PARAMETERS, SCHEMA_FILE,
+                 *(ROOT / 'config' / name for name in DOCUMENTS)):
         print(path.relative_to(ROOT))
 
 

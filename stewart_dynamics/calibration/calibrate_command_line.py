@@ -13,7 +13,7 @@ from stewart_dynamics.calibration import design_command
 from stewart_dynamics.program import (
     add_accepted, add_node, add_parameters, add_reading, add_report, between, DONE, names_of,
     Program, share)
-from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
+from stewart_dynamics.reporting.estimates import HOLD_OUT
 from stewart_dynamics.reporting.results_folder import CALIBRATED, DESIGNED
 from stewart_dynamics.signals import interrupt_on_signals
 from stewart_dynamics.tables.reading import Reading
@@ -133,7 +133,7 @@ def _run(given: argparse.Namespace) -> int:
                               Reading.given(given))
     _PROGRAM.prepare(find_parameter_errors(parameters))
     result = run(measured, str(given.poses), parameters, output, options)
-    _PROGRAM.warn(each['text'] for each in result['likely_mistakes'])
+    _PROGRAM.warn(each.text for each in result.likely_mistakes)
     _PROGRAM.say(result_text(result))
     return _PROGRAM.end(
-        output, {given.poses: missing}, given.strict and not is_complete(result))
+        output, {given.poses: missing}, given.strict and not result.is_complete)

@@ -5,21 +5,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.calibration.calibrate import Calibration
+from stewart_dynamics.calibration.calibration_record import CalibrationResult
 from stewart_dynamics.calibration.calibration_results import (
     frames_text, noise_text, outlier_text, validation_text)
 from stewart_dynamics.calibration.equations import BASE, PLATFORM
 from stewart_dynamics.estimation.confidence_level import INTERVAL, TWO_SIDED
 from stewart_dynamics.legs.calibrated import Calibrated, listed
-from stewart_dynamics.reporting.estimates import FIXED, page_values
+from stewart_dynamics.reporting.estimates import FIXED
 from stewart_dynamics.reporting.pages import digits, page
 from stewart_dynamics.reporting.vector_picture import Chart, Picture
 from stewart_dynamics.whole_file import write_files
@@ -36,19 +36,18 @@ _CHARACTER, _LINE = 5.9, 13.0
 _NOISE = 3.2
 
 
-def write_report(path: Path, result: Mapping[str, Any], found: Calibration) -> None:
+def write_report(path: Path, result: CalibrationResult, found: Calibration) -> None:
     """Write the page with the content of calibration.json."""
     times = _arrow_scale(found)
     text = page(
-        _FOLDER, 'calibration', document=True, r=result, name=Path(result['poses']['source']).name,
-        validation=validation_text(result['validation']), frames=frames_text(result),
-        noise=noise_text(result['noise']), line=found.legs.line,
-        outliers=[outlier_text(each) for each in result['outliers']],
+        _FOLDER, 'calibration', document=True, r=result, name=Path(result.poses.source).name,
+        validation=validation_text(result.validation), frames=frames_text(result.frames),
+        noise=noise_text(result.noise), line=found.legs.line,
+        outliers=[outlier_text(each) for each in result.outliers],
         changes=_changes(found), views=[
             _view(found, part, f'{name} joints, from above', times)
             for part, name in ((BASE, 'Base'), (PLATFORM, 'Platform'))
-            if any(state != FIXED for state in found.states[:PLATFORM.stop])],
-        **page_values(result))
+            if any(state != FIXED for state in found.states[:PLATFORM.stop])])
     write_files({path: text})
 
 

@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from stewart_dynamics.calibration.calibrate import calibrate
+from stewart_dynamics.calibration.calibration_record import CalibrationResult, Options
 from stewart_dynamics.calibration.calibration_report import write_report
 from stewart_dynamics.calibration.calibration_results import comments, document
 from stewart_dynamics.calibration.measured_poses import MeasuredPoses, METERS, Millimeters
@@ -38,15 +39,15 @@ class CalibrationOptions(NamedTuple):
     force: bool = False
     run: str = ''
 
-    def shown(self) -> dict[str, Any]:
+    def shown(self) -> Options:
         """Return the options of the calibration for JSON."""
-        shown = {name: value for name, value in self._asdict().items()
-                 if name not in ('noise', 'report', 'force', 'run')}
-        return shown | {'millimeters': self.millimeters._asdict()}
+        return Options(
+            list(self.fixed), list(self.unknowns), self.frames, self.hold_out,
+            self.millimeters._asdict(), self.degrees, self.drive_positions, self.accept_mistakes)
 
 
 def run(measured: MeasuredPoses, source: str, parameters: Parameters, folder: Path,
-        options: CalibrationOptions) -> dict[str, Any]:
+        options: CalibrationOptions) -> CalibrationResult:
     """
     Calibrate into a folder, created when complete; return the content of calibration.json.
 

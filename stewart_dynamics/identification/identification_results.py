@@ -11,15 +11,16 @@ plotly.js is included, numbers are base64 of typed arrays.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 import math
 from pathlib import Path
 import re
 import shlex
 import textwrap
-from typing import Any
 
+from msgspec import UNSET, UnsetType
+from msgspec.structs import replace
 import numpy as np
 
 from stewart_dynamics.arrays import Array
@@ -29,30 +30,25 @@ from stewart_dynamics.estimation.confidence_level import PERCENT, TWO_SIDED
 from stewart_dynamics.estimation.posterior import IDENTIFIABLE
 from stewart_dynamics.identification.extraction import Extracts
 from stewart_dynamics.identification.identification_options import IdentificationOptions
+from stewart_dynamics.identification.identification_record import (
+    IdentificationResult, LegResiduals, Options, ResidualsOfLegs)
 from stewart_dynamics.identification.identify import (
     Identification, Identified, Residuals)
 from stewart_dynamics.identification.lack_of_fit import NEXT, PIECE, WHOLE
 from stewart_dynamics.identification.parameter_fit import residual_of, shifted_by
-from stewart_dynamics.identification.unknowns import Unknowns
-from stewart_dynamics.legs import KINDS
-from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.least_squares import Identifiability, identifiability
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.program import SOFTWARE
-from stewart_dynamics.records import key_of
+from stewart_dynamics.records import of_kind
 from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.estimates import (
-    combined, estimate, IDENTIFIED, justified, NOT_IDENTIFIABLE, not_identifiable_lines,
-    page_values, table_lines, WITHOUT_VALUE)
+    Cause, combined, Estimate, estimate, FoundLackOfFit, IDENTIFIED, justified, LikelyError,
+    NOT_IDENTIFIABLE, not_identifiable_lines, table_lines, WITHOUT_VALUE)
 from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
 from stewart_dynamics.reporting.results_folder import (
     check_free, IDENTIFICATION, IDENTIFIED_PARAMETERS, remove_abandoned, REPORT_PAGE, whole_folder)
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.whole_file import now, write_files, write_json
 from tqdm import tqdm
-
-# Version of identification.json; increased when the meaning of a key changes.
-VERSION = 1
 
 _TEMPLATES = Path(__file__).with_name('templates')
 NOT_TESTED = ('not tested for a lack of fit: what can be used of the motion is too short: '
@@ -63,7 +59,7 @@ _MOST = 12_000
 
 
 def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: IdentificationOptions,
-        warn: Callable[[str], None]) -> dict[str, Any]:
+        warn: Callable[[str], None]) -> IdentificationResult:
     """
     Identify from bags into a folder; return the content of identification.json.
 
@@ -85,8 +81,7 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Ide
             warn(f'warning: {likely.text}')
         result = document(found, options)
         with whole_folder(folder, options, IDENTIFICATION, before) as partial:
-            _rounded(found).to_yaml(
-                partial / IDENTIFIED_PARAMETERS, comments(result, found.unknowns))
+            _rounded(found).to_yaml(partial / IDENTIFIED_PARAMETERS, comments(result))
             write_json(partial / IDENTIFICATION, result)
             if options.report:
                 write_report(partial / REPORT_PAGE, work.extracts, found, result)
@@ -102,70 +97,50 @@ def _rounded(found: Identified) -> Parameters:
         return found.parameters
 
 
-def document(found: Identified, options: IdentificationOptions) -> dict[str, Any]:
-    """Return the content of identification.json, see docs/identification.md."""
+def document(found: Identified, options: IdentificationOptions) -> IdentificationResult:
+    """Return the content of identification.json."""
     p, u, asked = found.parameters, found.unknowns, found.unknowns.asked
-    noise = key_of(f'noise_of_{p.leg_kind.position.field}', p.leg_kind.position.unit), key_of(
-        f'noise_of_{p.leg_kind.rate.field}', p.leg_kind.rate.unit)
     lack, what, states = found.lack_of_fit, *_identifiability(found)
     sure = all(lack is not None and each.what == lack.cause for each in found.likely)
     errors, parts = _errors(found), found.fit.parts(u)
-    parameters = [{**estimate(
-        u.names[n], u.units[n], u.start[n], found.fit.values[n], state, errors[n], share,
-        u.names[n] in found.fit.at_bound, sure, prior=True),
-        'written': found.written[n], 'file_deviation': u.deviations[n],
-        'parts': {name: each[n] for name, each in parts.items() if each[n] > 0.0}}
-        for n, state, share in zip(asked, states, what.shares, strict=True)]
     unclear = np.flatnonzero([state != IDENTIFIED for state in states])
-    return {
-        'version': VERSION, 'software': SOFTWARE,
-        'date': now(),
-        'bags': [{
-            **_renamed(bag._asdict(), noise), 'bag': str(bag.bag),
-            'delay_s': delay + bag.delay_s if error > 0.0 else None,
-            'delay_standard_error_s': error if error > 0.0 else None,
-        } for bag, delay, error in zip(
-            found.bags, found.fit.delays, found.fit.delay_errors, strict=True)],
-        'options': {
-            'identify': list(options.kinds), 'motor_torque': options.motor_torque,
-            'motor_current': options.motor_current,
-            'cutoff_hz': options.cutoff, 'hold_out': options.hold_out,
-            'delay': options.delay, 'accept_mistakes': options.accept_mistakes},
-        'samples': found.samples, 'efforts_left_out': found.unsound,
-        'efforts_outliers': found.outliers,
-        'parameters': parameters,
+    return of_kind(IdentificationResult, p.leg_kind)(
+        date=now(),
+        bags=[replace(bag, delay_s=delay + bag.delay_s if error > 0.0 else None,
+                      delay_standard_error_s=error if error > 0.0 else None)
+              for bag, delay, error in zip(
+                  found.bags, found.fit.delays, found.fit.delay_errors, strict=True)],
+        options=Options(
+            list(options.kinds), options.motor_torque, options.motor_current, options.cutoff,
+            options.hold_out, options.delay, options.accept_mistakes),
+        samples=found.samples, efforts_left_out=found.unsound, efforts_outliers=found.outliers,
+        parameters=[estimate(
+            u.names[n], u.units[n], u.start[n], found.fit.values[n], state, errors[n], share,
+            u.names[n] in found.fit.at_bound, sure, prior=True, written=found.written[n],
+            file_deviation=u.deviations[n],
+            parts={name: each[n] for name, each in parts.items() if each[n] > 0.0})
+            for n, state, share in zip(asked, states, what.shares, strict=True)],
         # Without single parameters: their intervals are too wide because of the lack of fit.
-        'combinations': [each for each in combined(
+        combinations=[each for each in combined(
             what, [u.names[n] for n in asked], [u.units[n] for n in asked],
             found.fit.values[asked], found.fit.covariance[np.ix_(asked, asked)], unclear,
-            (errors - found.fit.deviations)[asked]) if len(each['parameters']) > 1],
-        **_base_parameters(found, sure),
-        'rank': what.rank, 'unknowns': len(asked), 'singular_values': what.singular_values,
-        'residuals': _residuals(p, found.residuals),
-        'validation': None if found.validation is None else {
-            'samples': found.validation.samples, **_residuals(p, found.validation)},
-        'tested_for_lack_of_fit': found.tested,
-        'lack_of_fit': None if lack is None else {
-            'cause': lack.cause, 'text': _notice(found, sure),
-            'intervals': 'widened' if sure else 'none', 'residual_left': lack.left,
-            'causes': [{'what': each.what, 'text': each.text, 'statistic': each.statistic,
-                        'columns': each.columns, 'deviations': each.deviations}
-                       for each in lack.ranked]},
-        'likely_mistakes': [each._asdict() for each in found.likely],
-        'identified': p.plain(),
-    }
+            (errors - found.fit.deviations)[asked]) if len(each.parameters) > 1],
+        base_parameters=_base_parameters(found, sure) or UNSET,
+        rank=what.rank, unknowns=len(asked), singular_values=what.singular_values.tolist(),
+        residuals=_residuals(p, found.residuals),
+        validation=None if found.validation is None else _residuals(
+            p, found.validation, found.validation.samples),
+        tested_for_lack_of_fit=found.tested,
+        lack_of_fit=None if lack is None else FoundLackOfFit(
+            lack.cause, _notice(found, sure), 'widened' if sure else 'none',
+            [Cause(*each[:5]) for each in lack.ranked], lack.left),
+        likely_mistakes=[LikelyError(*each) for each in found.likely], identified=p.plain())
 
 
-def _renamed(bag: dict[str, Any], noise: tuple[str, str]) -> dict[str, Any]:
-    """Return the data of a bag with these names of the noise of positions and rates."""
-    names = dict(zip(('noise_of_positions', 'noise_of_rates'), noise, strict=True))
-    return {names.get(name, name): value for name, value in bag.items()}
-
-
-def _base_parameters(found: Identified, sure: bool) -> dict[str, Any]:
-    """Return estimates of ``LegKind.base_parameters`` that are uncertain, if there are any."""
+def _base_parameters(found: Identified, sure: bool) -> list[Estimate]:
+    """Return estimates of ``LegKind.base_parameters`` that are uncertain."""
     u, p, fit = found.unknowns, found.parameters, found.fit
-    estimates: list[dict[str, Any]] = []
+    estimates: list[Estimate] = []
     for each in p.leg_kind.base_parameters(p):
         for leg, joint in enumerate(p.joints):
             sums = np.zeros(len(u.start))
@@ -178,11 +153,11 @@ def _base_parameters(found: Identified, sure: bool) -> dict[str, Any]:
                 np.abs(sums) @ found.lack_of_fit.shifts) / TWO_SIDED
             error = math.sqrt(max(float(sums @ fit.covariance @ sums), 0.0)) + shifts
             state = IDENTIFIED if error < IDENTIFIABLE * before else NOT_IDENTIFIABLE
-            estimates.append({**estimate(
+            estimates.append(estimate(
                 f'{each.name}.{joint}', each.unit, float(sums @ u.start),
-                float(sums @ fit.values), state, error, 0.0, False, sure, prior=True),
-                'file_deviation': before})
-    return {'base_parameters': estimates} if estimates else {}
+                float(sums @ fit.values), state, error, 0.0, False, sure, prior=True,
+                file_deviation=before))
+    return estimates
 
 
 def _identifiability(found: Identified) -> tuple[Identifiability, list[str]]:
@@ -225,94 +200,73 @@ def _notice(found: Identified, sure: bool) -> str:
     return f'the residuals are more than noise: {cause}; {changes}; next: {advice}'
 
 
-def _residuals(p: Parameters, residuals: Residuals) -> dict[str, Any]:
+def _residuals(p: Parameters, residuals: Residuals, samples: int | UnsetType = UNSET,
+               ) -> ResidualsOfLegs:
     """Return the residuals of each leg, and their RMS of all legs."""
-    rms = dict(zip(_rms_keys(p.leg_kind), (
-        residuals.before, residuals.after, residuals.measured), strict=True))
-    return {'legs': {joint: {key: values[leg] for key, values in rms.items()}
-                     for leg, joint in enumerate(p.joints)},
-            **{key: np.sqrt(np.mean(values ** 2)) for key, values in rms.items()}}
+    rms = {'before_rms': residuals.before, 'after_rms': residuals.after,
+           'measured_rms': residuals.measured}
+    of_leg = of_kind(LegResiduals, p.leg_kind)
+    return of_kind(ResidualsOfLegs, p.leg_kind)(
+        **{key: float(np.sqrt(np.mean(values ** 2))) for key, values in rms.items()},
+        legs={joint: of_leg(**{key: values[leg] for key, values in rms.items()})
+              for leg, joint in enumerate(p.joints)}, samples=samples)
 
 
-def _rms_keys(kind: LegKind) -> tuple[str, str, str]:
-    """Return keys of RMS residuals by the file and by identified parameters, and of efforts."""
-    before, after, measured = (key_of(f'{each}_rms', kind.effort.unit)
-                               for each in ('before', 'after', 'measured'))
-    return before, after, measured
-
-
-def _kind_in(result: Mapping[str, Any]) -> LegKind:
-    """Return the kind of legs of identification.json."""
-    return next(kind for kind in KINDS if _rms_keys(kind)[0] in result['residuals'])
-
-
-def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
+def comments(result: IdentificationResult) -> dict[str, str]:
     """Return the comments of identified.yaml by parameter: intervals and date."""
     texts: dict[str, list[str]] = {}
-    of_masses = {each.name: each.parameter for each in _kind_in(result).masses}
+    of_masses = {each.name: each.parameter for each in result.kind.masses}
     several = Counter(of_masses.values())
-    for each in result['parameters']:
-        parts = each['name'].split('.')
+    for each in result.parameters:
+        parts = each.name.split('.')
         name = '.'.join(parts[:2]) if parts[0] == 'platform' else '.'.join(parts[:-1])
         of_mass, name = name, of_masses.get(name, name)
-        if each['state'] == IDENTIFIED:
-            text = (f'+-{TWO_SIDED * each["standard_error"]:.2g}' if each['interval'] else
-                    'no interval')
+        text = each.without_value
+        if text is None:
+            text = f'+-{each.half:.2g}' if each.interval else 'no interval'
             if name == 'gravity':  # the identified angle is not a value of the file
-                text = f'turned about {parts[1][-1]} by {each["value"]:.5f} {text} rad'
+                text = f'turned about {parts[1][-1]} by {each.value:.5f} {text} rad'
             elif several[name] > 1:
-                text = f'{of_mass.split(".", 2)[2]} {text} {each["unit"]}'
-        else:
-            text = WITHOUT_VALUE[each['state']]
+                text = f'{of_mass.split(".", 2)[2]} {text} {each.unit}'
         texts.setdefault(name, []).append(text)
     kept = WITHOUT_VALUE[NOT_IDENTIFIABLE]
     return {name: f'{kept} from the motion' if set(each) == {kept} else
-            f'identified {result["date"][:10]}, {PERCENT}: '
+            f'identified {result.date[:10]}, {PERCENT}: '
             + ', '.join(each if len(set(each)) > 1 else each[:1])
             for name, each in texts.items()}
 
 
-def result_text(result: Mapping[str, Any]) -> str:
+def result_text(result: IdentificationResult) -> str:
     """Return identification.json as text, at most 100 columns wide except for long names."""
-    lack = result['lack_of_fit']
+    lack = result.lack_of_fit
     # A command that is advised has a line of its own, to be copied.
     sentence, *command = re.split(
-        ': (?=stewart_)', f'LACK OF FIT: {lack["text"]}') if lack else ('',)
+        ': (?=stewart_)', f'LACK OF FIT: {lack.text}') if lack else ('',)
     notice = [*textwrap.wrap(sentence, 100), *(f'  {each}' for each in command)]
-    if not result['tested_for_lack_of_fit']:
+    if not result.tested_for_lack_of_fit:
         notice = textwrap.wrap(NOT_TESTED, 100)
-    lines = [*notice, *_headline(result), '', *table_lines(result['parameters'], 'identified'),
+    lines = [*notice, *_headline(result), '', *table_lines(result.parameters, 'identified'),
              *not_identifiable_lines(result, 'motion')]
-    if base := _shown_base_parameters(result):
+    if base := result.shown_base_parameters:
         lines += ['', 'base parameters of the legs, which the efforts show by themselves:',
                   *table_lines(base, 'identified')]
     lines += _bags(result)
     return '\n'.join(lines)
 
 
-def _shown_base_parameters(result: Mapping[str, Any]) -> list[Any]:
-    """Return base parameters if some of the masses in them were asked for."""
-    base: list[Any] = result.get('base_parameters', [])
-    kind = _kind_in(result)
-    inertial = kind.fields['reflected_mass'], *(each.name for each in kind.masses)
-    return base if any(each['name'].startswith(inertial) for each in result['parameters']) else []
-
-
-def _headline(result: Mapping[str, Any]) -> list[str]:
-    residuals, kind = result['residuals'], _kind_in(result)
-    (before, after, measured), unit = _rms_keys(kind), kind.effort.unit
-    lines = [f'residual RMS {residuals[before]:.4g} {unit} by the file, '
-             f'{residuals[after]:.4g} {unit} by the identified parameters '
-             f'({_percent(residuals[after], residuals[measured])} of the efforts)']
-    held = result['validation']
+def _headline(result: IdentificationResult) -> list[str]:
+    rms, held, unit = result.residuals, result.validation, result.kind.effort.unit
+    lines = [f'residual RMS {rms.before_rms:.4g} {unit} by the file, '
+             f'{rms.after_rms:.4g} {unit} by the identified parameters '
+             f'({_percent(rms.after_rms, rms.measured_rms)} of the efforts)']
     if held is None:
         lines.append('not validated: too little data to hold some out')
     else:
-        worst = max(held['legs'], key=lambda leg: held['legs'][leg][after])
+        worst, of_worst = max(held.legs.items(), key=lambda leg: leg[1].after_rms)
         lines.append(
-            f'on held-out time: {held[before]:.4g} {unit} by the file, '
-            f'{held[after]:.4g} {unit} by a fit to the rest; worst leg {worst}, '
-            f'{held["legs"][worst][after]:.4g} {unit}')
+            f'on held-out time: {held.before_rms:.4g} {unit} by the file, '
+            f'{held.after_rms:.4g} {unit} by a fit to the rest; worst leg {worst}, '
+            f'{of_worst.after_rms:.4g} {unit}')
     return lines
 
 
@@ -320,33 +274,32 @@ def _percent(part: float, whole: float) -> str:
     return f'{100.0 * part / whole:.2g} %' if whole > 0.0 else '-'
 
 
-def _bags(result: Mapping[str, Any]) -> list[str]:
-    lines, effort = [''], _kind_in(result).effort.name
-    for bag in result['bags']:
-        delay = '' if bag['delay_s'] is None else (
-            f', efforts {1e3 * abs(bag["delay_s"]):.2f} +- '
-            f'{1e3 * TWO_SIDED * bag["delay_standard_error_s"]:.2f} ms '
-            f'{"earlier" if bag["delay_s"] < 0.0 else "later"} than positions')
-        lines.append(f'{bag["bag"]}: {plural(bag["samples"], "sample")} in '
-                     f'{bag["seconds"]:.1f} s of {bag["legs"]}{delay}')
-        left = [(bag['samples_outliers'], 'wild value', 'replaced'),
-                (bag['samples_at_stops'], 'sample',
+def _bags(result: IdentificationResult) -> list[str]:
+    lines, effort = [''], result.kind.effort.name
+    for bag in result.bags:
+        delay = '' if bag.delay_s is None or bag.delay_standard_error_s is None else (
+            f', efforts {1e3 * abs(bag.delay_s):.2f} +- '
+            f'{1e3 * TWO_SIDED * bag.delay_standard_error_s:.2f} ms '
+            f'{"earlier" if bag.delay_s < 0.0 else "later"} than positions')
+        lines.append(f'{bag.bag}: {plural(bag.samples, "sample")} in '
+                     f'{bag.seconds:.1f} s of {bag.legs}{delay}')
+        left = [(bag.samples_outliers, 'wild value', 'replaced'),
+                (bag.samples_at_stops, 'sample',
                  f'at an end stop or {effort} limit left out'),
-                (bag['pieces_left_out'], 'piece', 'between gaps too short for the filters')]
+                (bag.pieces_left_out, 'piece', 'between gaps too short for the filters')]
         lines += [f'  {plural(number, what)} {why}' for number, what, why in left if number]
         lines += [f'  {plural(number, "message")} rejected: {why}'
-                  for why, number in bag['rejected'].items()]
-        lines += [f'  {notice}' for notice in bag['notices']]
-    if result['efforts_outliers']:
-        lines.append(f'{plural(result["efforts_outliers"], "filtered effort")} left out as '
-                     'outliers')
+                  for why, number in bag.rejected.items()]
+        lines += [f'  {notice}' for notice in bag.notices]
+    if result.efforts_outliers:
+        lines.append(f'{plural(result.efforts_outliers, "filtered effort")} left out as outliers')
     return lines
 
 
 # -- the report -----------------------------------------------------------------------------------
 
-def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapping[str, Any],
-                 ) -> None:
+def write_report(path: Path, extracts: Extracts, found: Identified,
+                 result: IdentificationResult) -> None:
     """Write the page of a result, with the content of identification.json."""
     legs = list(found.parameters.joints)
     curves, spectra = _curves(extracts, found)
@@ -355,14 +308,12 @@ def write_report(path: Path, extracts: Extracts, found: Identified, result: Mapp
             'spectra': spectra, 'first': int(np.argmax(found.residuals.after)),
             'effort': kind.effort.name, 'unit': kind.effort.unit, 'rate': kind.rate.name,
             'rate_unit': kind.rate.unit}
-    base = page_values({'parameters': _shown_base_parameters(result), 'combinations': []})
     script = plotly_script()
-    bag = result['bags'][0]['bag']
+    bag = result.bags[0].bag
     text = page(
         _TEMPLATES, 'identification', [script], document=True, r=result,
-        name=Path(bag).name or bag, **page_values(result), legs=legs, plotly=script, data=data,
-        two_sided=TWO_SIDED, samples=len(curves), most=_MOST, not_tested=NOT_TESTED, kind=kind,
-        rms=_rms_keys(kind), key_of=key_of, base_parameters=base['parameters'])
+        name=Path(bag).name or bag, legs=legs, plotly=script, data=data, two_sided=TWO_SIDED,
+        samples=len(curves), most=_MOST, not_tested=NOT_TESTED, kind=kind)
     write_files({path: text})
 
 

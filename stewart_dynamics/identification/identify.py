@@ -19,6 +19,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from msgspec.structs import replace
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NANOSECOND, SECOND
@@ -27,6 +28,7 @@ from stewart_dynamics.errors import BagError, ParameterError, PoseError, Singula
 from stewart_dynamics.identification.extraction import (
     Extract, Extraction, Extracts, time_for_filters, WindowRead)
 from stewart_dynamics.identification.identification_options import IdentificationOptions
+from stewart_dynamics.identification.identification_record import BagRead
 from stewart_dynamics.identification.lack_of_fit import (
     lack_of_fit, LackOfFit, LEFT_BY_FILTERS, long_pieces)
 from stewart_dynamics.identification.parameter_fit import (
@@ -43,6 +45,7 @@ from stewart_dynamics.mechanics.least_squares import BY_MEDIAN
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import FIXED, NEGATIVE, Parameters
 from stewart_dynamics.possible_errors.hypothesis import PossibleError
+from stewart_dynamics.records import of_kind
 from stewart_dynamics.tables.reading import is_table
 
 # Minimum number of samples per cut-off period; slowly sampled bags get a lower cut-off.
@@ -69,29 +72,6 @@ _Chosen = Callable[[Extract], Flags]
 
 def _used(extract: Extract) -> Flags:
     return extract.used
-
-
-class BagRead(NamedTuple):
-    """Data of a bag that was read, besides its extracts, by names of identification.json."""
-
-    bag: Path
-    samples: int
-    seconds: float
-    period_s: float
-    cutoff_hz: float
-    rates: bool
-    pieces_left_out: int  # number of windows between gaps that are too short for the filters
-    samples_at_stops: int
-    samples_outliers: int
-    noise_of_positions: float
-    noise_of_rates: float | None
-    delay_s: float
-    """Time by which the efforts were shifted beforehand; delays of the fit are added."""
-    rejected: dict[str, int]
-    missing: list[str]
-    notices: list[str]
-    legs: str = ''
-    efforts: str = ''
 
 
 class Residuals(NamedTuple):
@@ -126,7 +106,7 @@ class Identified:
     unknowns: Unknowns
     fit: Fit
     written: Array  # values (k,) of ``parameters``
-    bags: tuple[BagRead, ...]
+    bags: tuple[BagRead, ...]  # their delays: by which the efforts were shifted beforehand
     samples: int  # number of filtered samples of all bags
     outliers: int  # number of filtered efforts at which the platform does not follow the model
     unsound: int  # number left out before it: outliers in samples, end stops, force limits
@@ -178,11 +158,15 @@ class _Bag:
     def result(self, last: WindowRead) -> BagRead:
         """Return the data of the bag, with the noise of the last window."""
         of_positions, of_rates = last.deviations
-        return BagRead(
-            self.path, self.counts['samples'], (self.end - self.begin) * NANOSECOND, self.period,
-            self.extraction.cutoff, self.rates, self.counts['left out'], self.counts['stops'],
-            self.counts['outliers'], of_positions, of_rates if self.rates else None,
-            self.lag * self.period + self.extraction.later, {}, [], self.notices)
+        kind = self.extraction.platform.parameters.leg_kind
+        return of_kind(BagRead, kind)(
+            bag=str(self.path), samples=self.counts['samples'],
+            seconds=(self.end - self.begin) * NANOSECOND, period_s=self.period,
+            cutoff_hz=self.extraction.cutoff, rates=self.rates,
+            pieces_left_out=self.counts['left out'], samples_at_stops=self.counts['stops'],
+            samples_outliers=self.counts['outliers'], noise_of_positions=of_positions,
+            noise_of_rates=of_rates if self.rates else None,
+            delay_s=self.lag * self.period + self.extraction.later, notices=self.notices)
 
 
 class Identification:
@@ -222,8 +206,8 @@ class Identification:
                        'are without a gap; a lower --cutoff needs even more' if legs.samples
                        else ', '.join(f'{count} messages {why}' for why, count in
                                       legs.rejected.items()) or 'no messages'))
-            self.bags[-1] = bag._replace(
-                **topics._asdict(), samples=legs.samples, rejected=dict(legs.rejected),
+            self.bags[-1] = replace(
+                bag, **topics._asdict(), samples=legs.samples, rejected=dict(legs.rejected),
                 missing=list(recording.missing), notices=[*recording.notices, *bag.notices])
 
     def add(self, path: Path, windows: Iterable[Window]) -> BagRead | None:
@@ -402,7 +386,7 @@ class Identification:
         outliers = 0 if likely else self._leave_out()
         noisy = Noisy(self._moving, self._noisy)
         found = fit(extracts, unknowns, noisy, self._cutoffs)
-        delays = [bag.delay_s + delay
+        delays = [(bag.delay_s or 0.0) + delay
                   for bag, delay in zip(self.bags, found.delays, strict=True)]
         written = best_for_file(extracts, self.parameters, options.kinds, self._cutoffs,
                                 found.ratios(unknowns))

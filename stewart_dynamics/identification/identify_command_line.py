@@ -20,7 +20,7 @@ from stewart_dynamics.identification.unknowns import DEFAULT, KINDS, PLATFORM
 from stewart_dynamics.program import (
     add_accepted, add_motor_efforts, add_node, add_parameters, add_report, arguments_of, between,
     DONE, names_of, Program, share, whole)
-from stewart_dynamics.reporting.estimates import HOLD_OUT, is_complete
+from stewart_dynamics.reporting.estimates import HOLD_OUT
 from stewart_dynamics.reporting.results_folder import DESIGNED, DESIGNED_MOTION, IDENTIFIED
 from stewart_dynamics.signals import interrupt_on_signals
 
@@ -136,8 +136,8 @@ def _run(given: argparse.Namespace) -> int:
     _PROGRAM.prepare(find_parameter_errors(parameters))
     result = run(bags, parameters, output, options, _PROGRAM.complain)
     _PROGRAM.say(result_text(result))
-    return _PROGRAM.end(output, {bag['bag']: bag['missing'] for bag in result['bags']},
-                        given.strict and not is_complete(result))
+    return _PROGRAM.end(output, {bag.bag: bag.missing for bag in result.bags},
+                        given.strict and not result.is_complete)
 
 
 def _kinds(text: str) -> tuple[str, ...]:

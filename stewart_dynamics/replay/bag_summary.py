@@ -12,14 +12,13 @@ from msgspec import field
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.limits import LIMITS, limits_of_kind, POSE, Quantity
 from stewart_dynamics.program import SOFTWARE
-from stewart_dynamics.records import key_of, means, Number, Record
+from stewart_dynamics.records import key_of, means, Number, Record, Value
 from stewart_dynamics.reporting.block_statistics import ExceededLimit
 from stewart_dynamics.response.response_record import RecordedResponses
 
 VERSION = 1  # of summary.json; increased when the meaning of a key changes
 
 When = Annotated[Number, means('when')]
-Value = bool | int | float | str | list[Any] | None
 
 
 def margin_key(quantity: Quantity) -> str:

@@ -4,20 +4,24 @@
 """
 Estimated parameters as results show them: states, intervals, combinations; as JSON and as text.
 
-Identification and calibration describe their estimates alike.
+The results of identification and calibration are records of their own, ``EstimationResult`` and
+more keys.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import math
-from typing import Any
+from typing import Annotated, Any
 
+from msgspec import UNSET, UnsetType
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.estimation.confidence_level import INTERVAL, TWO_SIDED
 from stewart_dynamics.mechanics.least_squares import combinations, Identifiability, LEAST_SHARE
+from stewart_dynamics.program import SOFTWARE
+from stewart_dynamics.records import means, Number, Record
 
 IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE = 'identified', 'in_combination', 'not_identifiable'
 FIXED = 'fixed'  # held at the file's value by an option
@@ -29,6 +33,130 @@ WITHOUT_VALUE = {IN_COMBINATION: 'only in a combination', FIXED: 'fixed',
 _MOST_DECIMALS, _SMALL = 9, 1e-4
 
 
+class _Uncertain:
+    """A number with a standard error, as tables show it."""
+
+    __slots__ = ()
+    value: float
+    standard_error: Number
+
+    @property
+    def half(self) -> Number:
+        """Return half of the 95 % interval."""
+        return None if self.standard_error is None else TWO_SIDED * self.standard_error
+
+    @property
+    def digits(self) -> int:
+        """Return the decimals that the standard error justifies."""
+        return error_decimals(self.standard_error) if self.standard_error else 4
+
+
+class Estimate(_Uncertain, Record):
+    """An estimated parameter."""
+
+    name: Annotated[str, means('name of the parameter; of a leg it ends with the name of the leg')]
+    unit: Annotated[str, means('its unit')]
+    file: Annotated[float, means('value of the file')]
+    value: Annotated[float, means('estimate')]
+    state: Annotated[str, means(
+        '`identified`, `not_identifiable`, of a calibration also `in_combination`, `fixed`')]
+    standard_error: Annotated[Number, means('standard error; null: not known')]
+    interval: Annotated[tuple[float, float] | None, means(
+        '95 % interval; null: of a calibration if the number is not identified, or if there is a '
+        'lack of fit; of an identification only if a possible error was accepted, see '
+        '`likely_mistakes`')]
+    unknown_share: Annotated[float, means('0: identifiable by itself')]
+    at_bound: Annotated[bool, means(
+        'no body has the values that fit best: the value is at its bound')]
+    file_deviation: Annotated[float | UnsetType, means(
+        "of an identification: standard deviation of the file's value")] = UNSET
+    written: Annotated[float | UnsetType, means(
+        'of an identification: the value in `identified.yaml`')] = UNSET
+    parts: Annotated[dict[str, float] | UnsetType, means(
+        'of an identification: standard deviations by origin, without zeros: `noise`, `friction`, '
+        '`offset`, and the names in `uncertainty.*`; their squares add up to that of the whole, '
+        'without a widening')] = UNSET
+
+    @property
+    def change(self) -> float:
+        """Return the estimate less the value of the file, without a negative zero."""
+        return round(self.value - self.file, self.digits) + 0.0
+
+    @property
+    def without_value(self) -> str | None:
+        """Return in words why the estimate is not shown; None: it is."""
+        return WITHOUT_VALUE.get(self.state)
+
+
+class Combination(_Uncertain, Record):
+    """A combination of parameters that is identifiable."""
+
+    parameters: Annotated[list[str], means('names of the parameters')]
+    coefficients: Annotated[list[float], means('their coefficients')]
+    unit: Annotated[str, means('unit of the sum')]
+    value: Annotated[float, means('sum of coefficients times parameters')]
+    standard_error: Annotated[float, means('its standard error')]
+    words: Annotated[str, means('the sum in words')]
+
+
+class LikelyError(Record):
+    """A possible error, or a cause of a lack of fit."""
+
+    what: Annotated[str, means('keyword')]
+    text: Annotated[str, means('description in one line')]
+
+
+class Cause(LikelyError):
+    """A cause of a lack of fit."""
+
+    statistic: Annotated[float | UnsetType, means(
+        'of an identification: test statistic that the cause explains')] = UNSET
+    columns: Annotated[int | UnsetType, means(
+        'of an identification: its degrees of freedom')] = UNSET
+    deviations: Annotated[float | UnsetType, means(
+        'of an identification: standard deviations of a normal distribution with the same '
+        'probability')] = UNSET
+
+
+class FoundLackOfFit(Record):
+    """Residuals that are more than noise."""
+
+    cause: Annotated[str, means('keyword of the cause, or `unknown`')]
+    text: Annotated[str, means('description in one line')]
+    intervals: Annotated[str, means('`widened` or `none`')]
+    causes: Annotated[list[Cause], means('all significant ones, the likeliest first')]
+    residual_left: Annotated[float | UnsetType, means(
+        'of an identification: part of the RMS with the cause; 1: nothing is added to the model')
+        ] = UNSET
+
+
+class EstimationResult(Record, kw_only=True):
+    """The keys that identification.json and calibration.json have in common."""
+
+    version: Annotated[int, means('of these keys: 1')]
+    software: Annotated[str, means('name and version of the program that wrote the file')] = (
+        SOFTWARE)
+    date: Annotated[str, means('when, UTC')]
+    parameters: list[Estimate]
+    combinations: Annotated[list[Combination], means('identifiable sums of parameters')]
+    rank: Annotated[int, means('number of directions of the unknowns that are identifiable')]
+    unknowns: Annotated[int, means('number of unknowns')]
+    singular_values: Annotated[list[float], means('of the information in the data')]
+    lack_of_fit: Annotated[FoundLackOfFit | None, means(
+        'null: the residuals are noise, or not tested')]
+    likely_mistakes: Annotated[list[LikelyError], means('possible errors that were accepted')]
+
+    @property
+    def is_complete(self) -> bool:
+        """Return whether the model fits, and all is identified within bounds or fixed."""
+        return self.lack_of_fit is None and all(
+            each.state in (IDENTIFIED, FIXED) and not each.at_bound for each in self.parameters)
+
+    def in_state(self, state: str) -> list[str]:
+        """Return the names of the parameters in a state; those of legs share a line."""
+        return grouped([each.name for each in self.parameters if each.state == state])
+
+
 def states_of(what: Identifiability) -> list[str]:
     """Return the state of each parameter."""
     return [IDENTIFIED if known else IN_COMBINATION if part >= LEAST_SHARE else NOT_IDENTIFIABLE
@@ -36,9 +164,10 @@ def states_of(what: Identifiability) -> list[str]:
 
 
 def estimate(name: str, unit: str, start: float, value: float, state: str, error: float,
-             share: float, at_bound: bool, sure: bool, prior: bool = False) -> dict[str, Any]:
+             share: float, at_bound: bool, sure: bool, prior: bool = False, **more: Any,
+             ) -> Estimate:
     """
-    Return an estimated parameter for JSON.
+    Return an estimated parameter.
 
     name, unit, state: name, unit and state of the parameter.
     start, value: the file's value and the estimate.
@@ -46,21 +175,20 @@ def estimate(name: str, unit: str, start: float, value: float, state: str, error
     at_bound, sure: whether the value is at a bound; whether it has an interval, if it is
         identified.
     prior: whether the interval holds without that, because the file's uncertainty is in it.
+    more: keys that not all estimates have.
     """
-    return {
-        'name': name, 'unit': unit, 'file': start, 'value': value,
-        'state': state, 'standard_error': (
-            error if (prior or state != NOT_IDENTIFIABLE) and math.isfinite(error) else None),
-        'interval': ([value - TWO_SIDED * error, value + TWO_SIDED * error]
-                     if (prior or state == IDENTIFIED) and sure else None),
-        'unknown_share': share, 'at_bound': at_bound}
+    return Estimate(
+        name, unit, start, value, state,
+        error if (prior or state != NOT_IDENTIFIABLE) and math.isfinite(error) else None,
+        (value - TWO_SIDED * error, value + TWO_SIDED * error)
+        if (prior or state == IDENTIFIED) and sure else None, share, at_bound, **more)
 
 
 def combined(what: Identifiability, names: Sequence[str], units: Sequence[str], values: Array,
              covariance: Array, unclear: Integers | None = None,
-             widening: Array | None = None) -> list[dict[str, Any]]:
+             widening: Array | None = None) -> list[Combination]:
     """
-    Return the combinations of parameters that are identifiable, for JSON.
+    Return the combinations of parameters that are identifiable.
 
     widening: added to the standard error of each parameter, as where there is a lack of fit.
     """
@@ -70,11 +198,10 @@ def combined(what: Identifiability, names: Sequence[str], units: Sequence[str], 
         c = each.coefficients
         variance = float(c @ covariance[np.ix_(places, places)] @ c)
         wider = 0.0 if widening is None else float(np.abs(c) @ widening[places])
-        result.append({
-            'parameters': [names[n] for n in places], 'coefficients': c,
-            'unit': units[places[0]], 'value': c @ values[places],
-            'standard_error': math.sqrt(max(variance, 0.0)) + wider,
-            'words': in_words(c, [names[n] for n in places])})
+        of = [names[n] for n in places]
+        result.append(Combination(
+            of, c.tolist(), units[places[0]], float(c @ values[places]),
+            math.sqrt(max(variance, 0.0)) + wider, in_words(c, of)))
     return result
 
 
@@ -97,40 +224,37 @@ def in_words(coefficients: Array, names: Sequence[str]) -> str:
     return text
 
 
-def table_lines(parameters: Sequence[Mapping[str, Any]], column: str) -> list[str]:
+def table_lines(parameters: Sequence[Estimate], column: str) -> list[str]:
     """Return the table of estimates for the terminal; ``column`` is the heading of the values."""
-    name_width = max([len(each['name']) for each in parameters] + [9])
+    name_width = max([len(each.name) for each in parameters] + [9])
     lines = [f'{"parameter":<{name_width}} {"file":>10} {column:>12} {INTERVAL:>28}'
              '  unit']
     for each in parameters:
-        if each['state'] == IDENTIFIED:
-            error = each['standard_error']
-            value = f'{each["value"]:.5g}' if error is None else rounded(each['value'], error)
-            shown = f'{value:>12}', 'no interval'
-            if each['interval']:
-                shown = shown[0], ' .. '.join(rounded(end, error) for end in each['interval'])
-            remark = '  at its bound' if each['at_bound'] else ''
-        else:
-            shown, remark = (f'{"-":>12}', WITHOUT_VALUE[each['state']]), ''
-        lines.append(f'{each["name"]:<{name_width}} {each["file"]:>10.5g} {shown[0]} '
-                     f'{shown[1]:>28}  {each["unit"]}{remark}')
+        value, interval, remark = '-', each.without_value, ''
+        if interval is None:
+            error = each.standard_error
+            value, interval = f'{each.value:.5g}', 'no interval'
+            if error is not None:
+                value = rounded(each.value, error)
+                if each.interval:
+                    interval = ' .. '.join(rounded(end, error) for end in each.interval)
+            remark = '  at its bound' if each.at_bound else ''
+        lines.append(f'{each.name:<{name_width}} {each.file:>10.5g} {value:>12} '
+                     f'{interval:>28}  {each.unit}{remark}')
     return lines
 
 
-def not_identifiable_lines(result: Mapping[str, Any], source: str) -> list[str]:
+def not_identifiable_lines(result: EstimationResult, source: str) -> list[str]:
     """Return the parameters and combinations that the motion or the poses do not identify."""
-    unknown = [each['name'] for each in result['parameters'] if each['state'] == NOT_IDENTIFIABLE]
     lines = []
-    if unknown:
-        lines += ['', f'not identifiable from the {source}:',
-                  *(f'  {name}' for name in grouped(unknown))]
-    if result['combinations']:
+    if unknown := result.in_state(NOT_IDENTIFIABLE):
+        lines += ['', f'not identifiable from the {source}:', *(f'  {name}' for name in unknown)]
+    if result.combinations:
         lines += ['', 'identifiable only in combinations:']
-        for each in result['combinations']:
-            size = TWO_SIDED * each['standard_error']
-            value, half = (rounded(number, each['standard_error'])
-                           for number in (each['value'], size))
-            lines.append(f'  {each["words"]} = {value} +- {half} {each["unit"]}')
+        for each in result.combinations:
+            value, half = (rounded(number, each.standard_error)
+                           for number in (each.value, TWO_SIDED * each.standard_error))
+            lines.append(f'  {each.words} = {value} +- {half} {each.unit}')
     return lines
 
 
@@ -160,32 +284,3 @@ def grouped(names: Sequence[str]) -> list[str]:
         groups.setdefault(begin, []).append(end)
     return [f'{begin}: {" ".join(ends)}' if begin else ' '.join(ends)
             for begin, ends in groups.items()]
-
-
-def is_complete(result: Mapping[str, Any]) -> bool:
-    """Return whether the model fits, and all parameters are identified within bounds or fixed."""
-    return result['lack_of_fit'] is None and all(
-        each['state'] in (IDENTIFIED, FIXED) and not each['at_bound']
-        for each in result['parameters'])
-
-
-def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of the template ``estimates.html``."""
-    def drawn(each: Mapping[str, Any]) -> dict[str, Any]:
-        error = each['standard_error']
-        return {**each, 'half': None if error is None else TWO_SIDED * error,
-                'digits': error_decimals(error) if error else 4}
-
-    def changed(each: Mapping[str, Any]) -> dict[str, Any]:
-        row = drawn(each)
-        # a sum with 0.0, so that no -0.000 is written
-        return {**row, 'change': round(row['value'] - row['file'], row['digits']) + 0.0,
-                'without_value': WITHOUT_VALUE.get(row['state'])}
-
-    def named(state: str) -> list[str]:
-        return grouped([each['name'] for each in result['parameters'] if each['state'] == state])
-
-    return {'parameters': [changed(each) for each in result['parameters']],
-            'combinations': [drawn(each) for each in result['combinations']],
-            'identified': sum(each['state'] == IDENTIFIED for each in result['parameters']),
-            'combined': named(IN_COMBINATION), 'not_identifiable': named(NOT_IDENTIFIABLE)}
