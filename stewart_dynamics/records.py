@@ -12,7 +12,8 @@ A key that is named by the quantities of a kind of legs has braces,
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, reduce
+from operator import or_
 from types import UnionType
 from typing import (
     Annotated, Any, ClassVar, get_args, get_origin, TYPE_CHECKING, TypeVar, Union)
@@ -106,7 +107,7 @@ def _type_of_kind(kind_of_value: Any, kind: LegKind) -> Any:
     if origin in (list, dict):
         return origin[tuple(_type_of_kind(each, kind) for each in arguments)]
     if origin in (Union, UnionType):
-        return Union[tuple(_type_of_kind(each, kind) for each in arguments)]
+        return reduce(or_, (_type_of_kind(each, kind) for each in arguments))
     return kind_of_value
 
 

@@ -31,12 +31,14 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet import main
 from stewart_dynamics.datasheet.claimed_box import doubtful_ranges
 from stewart_dynamics.datasheet.datasheet import soft_legs
+from stewart_dynamics.datasheet.datasheet_record import (
+    Box, HeldPayload, JudgedMotion, Rating, Translations)
 from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, both_ways, box_verdict, down, LINEAR, motion_verdict, numbers,
     rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing, upright
 from stewart_dynamics.datasheet.motion_ratings import judged, uses
-from stewart_dynamics.datasheet.pose_ratings import at_pose, AXES, KEYS, Payloads, stiffness
+from stewart_dynamics.datasheet.pose_ratings import AXES, KEYS, Payloads, rate_poses, stiffness
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.mechanics.parameter_errors import find_option_errors
 from stewart_dynamics.replay import main as replay
@@ -154,11 +156,12 @@ def test_ranges_at_once_are_reachable_and_no_larger_ones_are(figures: dict[str, 
 
 def test_force_and_moment_act_at_the_pivot() -> None:
     rated = RatedHexapod(PARAMETERS, pivot=PIVOT)
-    found, home = at_pose(rated), StewartPlatform(PARAMETERS).home_pose()
+    found, home = rate_poses(rated, rated.pose[None]), StewartPlatform(PARAMETERS).home_pose()
     for key in KEYS:
         kind = 'moment' if key.startswith('r') else 'force'
         load = np.zeros(6)
-        load[KEYS.index(key) // 2] = found[kind][key]['value'] * (-1.0 if key[-1] == '-' else 1.0)
+        load[KEYS.index(key) // 2] = getattr(found, kind).under(key).value * (
+            -1.0 if key[-1] == '-' else 1.0)
         load[3:] += np.cross(PIVOT, load[:3])
         forces = StewartPlatform(PARAMETERS).inverse_dynamics(
             Motion.from_pose(home), wrench=-load).forces
@@ -166,7 +169,8 @@ def test_force_and_moment_act_at_the_pivot() -> None:
 
 
 def test_the_rated_payload_brings_a_leg_to_its_largest_force(snapshot: Snapshot) -> None:
-    largest = at_pose(RatedHexapod(PARAMETERS, pivot=PIVOT))['payload']['value']
+    rated = RatedHexapod(PARAMETERS, pivot=PIVOT)
+    largest = rate_poses(rated, rated.pose[None]).payload.value
     loaded = RatedHexapod(PARAMETERS, payload=Payload(largest * (1.0 - 1e-12), PIVOT))
     forces = loaded.platform.inverse_dynamics(Motion.from_pose(loaded.pose)).forces
     assert np.abs(forces).max() == pytest.approx(6000.0, rel=1e-9)
@@ -178,7 +182,7 @@ def test_natural_frequencies_are_those_with_held_motors() -> None:
     driven = PARAMETERS.replaced({
         'actuator.reflected_mass': None, 'actuator.screw_lead': 0.005, 'drive.gear_ratio': 3.0,
         'drive.motor_inertia': 1.37e-4})
-    found = [stiffness(RatedHexapod(each), 5e7, None, 3)['frequencies']
+    found = [stiffness(RatedHexapod(each), 5e7, None, 3).frequencies
              for each in (PARAMETERS, driven)]
     assert found[0] == found[1]
     held = StewartPlatform(driven.replaced({
@@ -268,14 +272,14 @@ def test_a_motion_at_its_factor_uses_a_limit_whole(recorded: RecordedMotion) -> 
     platform = StewartPlatform(PARAMETERS)
     used = uses(platform, recorded)
     found = judged(platform, recorded, used)
-    k, m = found['factor'], recorded.motion
+    k, m = found.factor, recorded.motion
     faster = recorded._replace(motion=Motion(
         m.position, m.rotation, k * m.linear_velocity, m.angular_velocity,
         k * k * m.linear_acceleration, m.angular_acceleration))
     used = uses(platform, faster)
-    assert found['limit'] == 'velocity_max'
+    assert found.limit == 'velocity_max'
     assert max(each.max() for each in used.values()) == pytest.approx(1.0, rel=1e-9)
-    assert recorded.seconds[int(used['rate'].argmax())] == found['at_s']
+    assert recorded.seconds[int(used['rate'].argmax())] == found.at_s
 
 
 def test_the_motion_between_setpoints_is_judged_where_it_is_known(
@@ -285,26 +289,25 @@ def test_the_motion_between_setpoints_is_judged_where_it_is_known(
         seconds=recorded.seconds[few] - recorded.seconds[2],
         motion=Motion.of_rows(recorded.motion.rows[few]), wrench=recorded.wrench[few])
 
-    def between(motion: RecordedMotion) -> dict[str, Any]:
-        found: dict[str, Any] = judged(platform, motion, uses(platform, motion))
-        return found
+    def between(motion: RecordedMotion) -> JudgedMotion:
+        return judged(platform, motion, uses(platform, motion))
 
     found = between(coarse)
-    assert found['between_setpoints']['reason'] is None
-    assert 0.9 * found['factor'] < found['between_setpoints']['factor'] <= found['factor']
+    assert found.between_setpoints.reason is None
+    assert 0.9 * found.factor < found.between_setpoints.factor <= found.factor
     loaded = coarse.wrench.copy()
     loaded[1, 2] = 5.0
     for changed, text in ((coarse._replace(wrench=loaded), 'the wrench or the base changes'),
                           (coarse._replace(seconds=0.0 * coarse.seconds), 'do not increase')):
         judgement = between(changed)
-        assert text in judgement['between_setpoints']['reason']
+        assert text in judgement.between_setpoints.reason
         assert text in between_setpoints(judgement)
     snapshot(between_setpoints(found))
     # without velocities no speed ends the setpoints, but the motion between them
     still = between(coarse._replace(motion=Motion(
         coarse.motion.position, coarse.motion.rotation)))
-    assert still['factor'] is None
-    assert still['between_setpoints']['factor'] > 0.0
+    assert still.factor is None
+    assert still.between_setpoints.factor > 0.0
 
 
 def test_poses_far_out_of_range_are_counted_as_rejected(tmp_path: Path) -> None:
@@ -327,13 +330,13 @@ def test_a_motion_that_exceeds_a_limit_is_not_possible(
         changes: dict[str, float], limit: str, recorded: RecordedMotion) -> None:
     platform = StewartPlatform(PARAMETERS.replaced(changes))
     found = judged(platform, recorded, uses(platform, recorded))
-    assert not found['possible']
-    assert found['factor'] < 1.0
-    assert found['limit'] == limit
-    assert found['amplitude']['value'] < 1.0
+    assert not found.possible
+    assert found.factor < 1.0
+    assert found.limit == limit
+    assert found.amplitude.value < 1.0
     # where the path is not possible no payload can be added in it
-    assert (found['payload'] is None) == (found['factor'] == 0.0) == (limit != 'velocity_max')
-    assert (found['between_setpoints'] is None) == (limit != 'velocity_max')
+    assert (found.payload is None) == (found.factor == 0.0) == (limit != 'velocity_max')
+    assert (found.between_setpoints is None) == (limit != 'velocity_max')
 
 
 def test_a_motion_ends_at_the_first_limit_though_it_is_singular_later(
@@ -345,10 +348,10 @@ def test_a_motion_ends_at_the_first_limit_though_it_is_singular_later(
         platform = StewartPlatform(PARAMETERS.replaced(
             {'limits.length_min': 0.1, 'limits.length_max': longest}))
         found = judged(platform, turned, uses(platform, turned))
-        assert (found['limit'], found['at_s']) == (limit, turned.seconds[sample])
-        assert found['possible'] is False
-        assert found['factor'] == 0.0
-        assert found['amplitude'] is found['payload'] is None
+        assert (found.limit, found.at_s) == (limit, turned.seconds[sample])
+        assert found.possible is False
+        assert found.factor == 0.0
+        assert found.amplitude is found.payload is None
 
 
 def test_without_a_limit_of_its_speed_a_motion_is_possible_and_can_be_larger(
@@ -356,9 +359,9 @@ def test_without_a_limit_of_its_speed_a_motion_is_possible_and_can_be_larger(
     platform = StewartPlatform(PARAMETERS.replaced({
         'limits.velocity_max': None, 'limits.force_max': None}))
     found = judged(platform, recorded, uses(platform, recorded))
-    assert found['possible']
-    assert found['factor'] is found['limit'] is found['payload'] is None
-    assert found['amplitude']['value'] > 1.0
+    assert found.possible
+    assert found.factor is found.limit is found.payload is None
+    assert found.amplitude.value > 1.0
     snapshot(motion_verdict(found))
 
 
@@ -589,14 +592,12 @@ def test_a_box_with_a_singularity_in_it_has_no_excess(snapshot: Snapshot) -> Non
     box[3] = -3.0, 3.0
     worst = RatedHexapod(unlimited, Pose([0.0, 0.0, 1.18], np.eye(3))).reachable(box).worst
     assert (worst.limit, worst.leg, finite(worst.excess)) == ('singularity', -1, None)
-    snapshot(box_verdict({'possible': False, 'factor': None, 'displacement': {'rx': 3.0},
-                          'limit': worst.limit, 'leg': None, 'excess': None}))
+    snapshot(box_verdict(Box(worst.limit, None, False, None, {}, None, {'rx': 3.0}, [], [])))
 
 
 @pytest.mark.parametrize('limit', ['length_max', 'leg_clearance_min', 'base_joint_angle_max'])
 def test_the_excess_of_a_box_has_the_unit_of_its_limit(limit: str, snapshot: Snapshot) -> None:
-    snapshot(box_verdict({'possible': False, 'factor': None, 'displacement': {'x': 0.5},
-                          'limit': limit, 'leg': 'leg_1', 'excess': 0.01}))
+    snapshot(box_verdict(Box(limit, 'leg_1', False, None, {}, 0.01, {'x': 0.5}, [], [])))
 
 
 def test_without_limits_there_is_no_datasheet_and_ratings_without_theirs_are_left_out(
@@ -627,7 +628,7 @@ def test_legs_that_are_too_near_reject_a_pose_and_make_a_motion_impossible(
         platform = StewartPlatform(p.replaced({
             'limits.leg_clearance_min': factor * float(np.min(nearest))}))
         used = uses(platform, recorded)
-        assert judged(platform, recorded, used)['possible'] == possible
+        assert judged(platform, recorded, used).possible == possible
     rated = RatedHexapod(p)
     assert rated.clearance() == pytest.approx(rated.loads.clearance(rated.pose))
     assert RatedHexapod(PARAMETERS).clearance() is None
@@ -664,16 +665,15 @@ def test_report_and_datasheet_of_a_motion_link_to_each_other(tmp_path: Path) -> 
 
 def test_rejected_messages_of_a_motion_are_counted(snapshot: Snapshot) -> None:
     motion = read_motion(ROOT / 'bags' / 'flawed', PARAMETERS, Options(), lambda size: None)
-    said = setpoints_used({'samples': len(motion.seconds), 'rejected': motion.rejected})
-    snapshot(said)
+    snapshot(setpoints_used(len(motion.seconds), motion.rejected))
 
 
 @pytest.mark.parametrize(('source', 'payload'), [
     ('fixed', ('', 3.0)), ('pose', (', base in any orientation', 2.0))])
 def test_the_payload_of_a_base_that_turns_is_that_of_any_orientation(
         source: str, payload: tuple[str, float]) -> None:
-    assert rated_payload({'parameters': {'base.source': source}},
-                         {'value': 3.0, 'any_orientation': 2.0}) == payload
+    assert rated_payload(
+        HeldPayload(None, None, 3.0, 2.0), {'base.source': source}) == payload
 
 
 def test_results_are_replaced_only_by_option(
@@ -703,7 +703,7 @@ def test_figures_are_rounded_toward_zero(value: float | None, text: str) -> None
 def test_ranges_that_look_equal_are_written_once() -> None:
     unit = LINEAR['travel']
     write: Callable[[float, float], str] = lambda low, high: both_ways(  # noqa: E731
-        {'x-': {'value': low}, 'x+': {'value': high}}, 'x', unit)
+        Translations(*(Rating(None, None, each) for each in 3 * (high, low))), 'x', unit)
     assert write(0.1, 0.10001) == '±100.0'
     assert write(0.1, 0.2) == '−100.0\u00a0… +200.0'
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from msgspec.structs import replace
 import numpy as np
 import pytest
 from referees import ROOT
@@ -18,6 +19,7 @@ from stewart_dynamics import (
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet import main
 from stewart_dynamics.datasheet.datasheet import soft_legs
+from stewart_dynamics.datasheet.datasheet_record import Box
 from stewart_dynamics.datasheet.datasheet_text import box_verdict
 from stewart_dynamics.datasheet.hexapod_drawing import Drawing
 from stewart_dynamics.datasheet.motion_ratings import judged, uses
@@ -144,16 +146,16 @@ def test_a_motion_at_its_factor_uses_a_limit_whole() -> None:
     recorded = motion()
     used = uses(PLATFORM, recorded)
     found = judged(PLATFORM, recorded, used)
-    k, rows = found['factor'], recorded.motion.rows.copy()
+    k, rows = found.factor, recorded.motion.rows.copy()
     rows[:, 12:18] *= k
     rows[:, 18:] *= k * k
     used = uses(PLATFORM, recorded._replace(motion=Motion.of_rows(rows)))
     assert max(each.max() for each in used.values()) == pytest.approx(1.0, rel=1e-9)
     assert set(used) == {'angle', 'lever', 'speed', 'torque', 'rod force', 'singularity'}
-    between = found['between_setpoints']
-    assert between['reason'] is None
-    assert 0.99 * k < between['factor'] <= k
-    assert between['limit'] == found['limit']
+    between = found.between_setpoints
+    assert between.reason is None
+    assert 0.99 * k < between.factor <= k
+    assert between.limit == found.limit
 
 
 @pytest.mark.parametrize(('height', 'changes', 'limit'), [
@@ -164,7 +166,7 @@ def test_a_motion_past_a_limit_of_poses_is_possible_at_no_speed(
         height: float, changes: dict[str, Any], limit: str) -> None:
     platform, recorded = StewartPlatform(PARAMETERS.replaced(changes)), motion(3.0, height)
     found = judged(platform, recorded, uses(platform, recorded))
-    assert (found['possible'], found['factor'], found['limit']) == (False, 0.0, limit)
+    assert (found.possible, found.factor, found.limit) == (False, 0.0, limit)
 
 
 @pytest.mark.parametrize(('pose', 'error', 'words'), [
@@ -192,7 +194,6 @@ def test_the_unit_of_a_stiffness_and_of_an_excess() -> None:
     words, = soft_legs(PARAMETERS, 20.0)
     assert words.startswith('--leg-stiffness: 20 N m/rad: six such drives and 160 kg have')
     assert not list(soft_legs(PARAMETERS, 2e4))
-    found = {'possible': False, 'factor': None, 'displacement': {'x': 0.5}, 'leg': 'leg_1'}
-    assert box_verdict({**found, 'limit': 'lever_min', 'excess': 0.0123}).startswith(
-        'lever of a crank (leg_1) exceeded by 0.01230 at')
-    assert 'exceeded by 5.729 °' in box_verdict({**found, 'limit': 'angle_max', 'excess': 0.1})
+    box = Box('lever_min', 'leg_1', False, None, {}, 0.0123, {'x': 0.5}, [], [])
+    assert box_verdict(box).startswith('lever of a crank (leg_1) exceeded by 0.01230 at')
+    assert 'exceeded by 5.729 °' in box_verdict(replace(box, limit='angle_max', excess=0.1))

@@ -52,7 +52,8 @@ def tables(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 def test_generated_tables_are_current(tables: ModuleType) -> None:
     pages = tables.pages()
     assert {path.relative_to(ROOT).as_posix() for path in pages} == {
-        'benchmarks/README.md', 'docs/calibration.md', 'docs/cranks.md', 'docs/faults.md',
+        'benchmarks/README.md', 'docs/calibration.md', 'docs/capability.md', 'docs/cranks.md',
+        'docs/faults.md',
         'docs/identification.md', 'docs/identify_from_bags.md', 'docs/node.md',
         'docs/motion_cueing.md', 'docs/parameters.md', 'docs/simulator.md',
         'docs/summary.md', 'security/policy.xml'}

@@ -53,7 +53,7 @@ def is_possible(platform: StewartPlatform, recorded: RecordedMotion, change: str
         changed = Motion(position[0] + by * (position - position[0]), small.as_matrix(),
                          *(by * each for each in rates))
         return judged(platform, recorded._replace(motion=changed), uses(
-            platform, recorded._replace(motion=changed)))['possible'] is True
+            platform, recorded._replace(motion=changed))).possible
     changed = Motion(position, m.rotation, *rates)
     used = uses(platform, recorded._replace(motion=changed))
     return all(each.max() <= 1.0 + 1e-9 for each in used.values())
@@ -65,14 +65,14 @@ def test_a_motion_is_possible_with_each_change_and_not_with_less(
     changes, expected = CASES[name]
     platform = StewartPlatform(FILE.replaced(changes))
     found = judged(platform, recorded, uses(platform, recorded))
-    assert not found['possible']
-    assert [each['change'] for each in found['possible_with']] == expected
-    for each in found['possible_with']:
-        change, value = each['change'], each['value']
+    assert not found.possible
+    assert [each.change for each in found.possible_with] == expected
+    for each in found.possible_with:
+        change, value = each.change, each.value
         assert is_possible(platform, recorded, change, value)
         less = value - np.sign(value) * 0.01 if change == 'height' else value + 0.03
         assert not is_possible(platform, recorded, change, less)
-    words = ' '.join(each['words'] for each in found['possible_with'])
+    words = ' '.join(each.words for each in found.possible_with)
     assert ('higher' in words) == (name == 'longer legs')
     assert ('lower' in words) == (name == 'hanging')
 
@@ -88,16 +88,16 @@ def test_motions_of_cranks_are_changed_as_well(size: float, expected: list[str])
         platform.home_pose().position + sine, still, cosine, still, -sine, still)
     recorded = RecordedMotion(times, motion, np.zeros((500, 6)), None, [])
     found = judged(platform, recorded, uses(platform, recorded))
-    assert [each['change'] for each in found['possible_with']] == expected
-    for each in found['possible_with']:
-        for value, possible in ((each['value'], True), (
-                each['value'] + (0.02 if each['change'] == 'amplitude' else -0.005), False)):
-            assert is_possible(platform, recorded, each['change'], value) is possible
+    assert [each.change for each in found.possible_with] == expected
+    for each in found.possible_with:
+        for value, possible in ((each.value, True), (
+                each.value + (0.02 if each.change == 'amplitude' else -0.005), False)):
+            assert is_possible(platform, recorded, each.change, value) is possible
 
 
 def test_a_possible_motion_has_no_changes(recorded: RecordedMotion) -> None:
     platform = StewartPlatform(FILE)
-    assert judged(platform, recorded, uses(platform, recorded))['possible_with'] == []
+    assert judged(platform, recorded, uses(platform, recorded)).possible_with == []
 
 
 def test_terminal_and_page_say_with_which_changes_a_motion_is_possible(
@@ -121,5 +121,5 @@ def test_a_motion_of_more_than_half_a_turn_has_no_smaller_amplitude() -> None:
             np.tile([0.0, 0.0, 0.2 * np.pi], (1001, 1))), np.zeros((1001, 6)), None, [])
     platform = StewartPlatform(FILE)
     found = judged(platform, turning, uses(platform, turning))
-    assert not found['possible']
-    assert 'amplitude' not in [each['change'] for each in found['possible_with']]
+    assert not found.possible
+    assert 'amplitude' not in [each.change for each in found.possible_with]

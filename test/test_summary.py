@@ -18,9 +18,6 @@ from bag_summaries import bag_summary, motion_of
 from checked_results import part_of
 from hypothesis import given
 from hypothesis import strategies as st
-import jsonschema
-from msgspec import ValidationError
-from msgspec.structs import replace
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -32,8 +29,6 @@ from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, TIME, UNSOLVABLE_CONDITION
-from stewart_dynamics.records import record_of
-from stewart_dynamics.replay.bag_summary import BagSummary
 from stewart_dynamics.replay.residuals import AXES
 from stewart_dynamics.replay.statements import cards
 from stewart_dynamics.replay.summary import Answered, Summary
@@ -473,22 +468,6 @@ def test_every_key_is_documented() -> None:
     assert {key for key in documented if key.startswith(parts)} == found - {
         'limit_met', 'limits_not_checked', 'motors', 'quasi_static'}
     assert set(SOURCES) <= documented
-
-
-@pytest.mark.parametrize('file', ['platform', 'crank_platform'])
-def test_a_summary_follows_its_schema_and_is_read_from_its_document(file: str) -> None:
-    parameters = Parameters.from_yaml(ROOT / 'config' / f'{file}.yaml')
-    summary = replace(Summary(parameters).values(), parameters=parameters.plain())
-    document = json.loads(to_json(summary))
-    schema = json.loads((ROOT / 'config' / 'summary.schema.json').read_text(encoding='utf-8'))
-    jsonschema.Draft202012Validator.check_schema(schema)
-    check = jsonschema.Draft202012Validator(schema)
-    check.validate(document)
-    assert to_json(record_of(BagSummary, document, parameters.leg_kind)) == to_json(summary)
-    document['setpoints']['answered'] = 'all'
-    assert not check.is_valid(document)
-    with pytest.raises(ValidationError, match='answered'):
-        record_of(BagSummary, document, parameters.leg_kind)
 
 
 # Energy

@@ -116,17 +116,17 @@ def test_a_heavier_platform_carries_less() -> None:
         **dict.fromkeys(SMALL, 0.0), 'uncertainty.platform_mass': 0.1,
         'platform.center_of_mass': [0.0, 0.0, 0.0]})
     hexapod = RatedHexapod(p)
-    found = uncertain_payload(hexapod, 40)['payload']
+    found = uncertain_payload(hexapod, 40).payload
     alone = float(hexapod.loads.payload(hexapod.pose, np.zeros(3)).value)
     masses = [each.platform.mass - p.platform.mass for each in uncertain_parameters(p, 40)]
     high, middle, low = np.percentile(masses, [2.5, 50.0, 97.5])
     np.testing.assert_allclose(
-        [found['low'], found['median'], found['high']],
+        [found.low, found.median, found.high],
         [alone - low, alone - middle, alone - high], rtol=1e-9)
     weak = RatedHexapod(p.replaced({'limits.force_max': 350.0}))
     expected = float(weak.loads.payload(weak.pose, np.zeros(3)).value)
     assert 0.0 <= expected < 20.0
-    overloaded = uncertain_payload(weak, 40)['overloaded']
+    overloaded = uncertain_payload(weak, 40).overloaded
     assert overloaded == sum(each >= expected for each in masses)
     assert 0 < overloaded < 40
 

@@ -27,6 +27,7 @@ from msgspec.structs import fields
 from stewart_dynamics.calibration.calibration_record import CalibrationResult
 from stewart_dynamics.cueing.cueing_parameters import CueingParameters
 from stewart_dynamics.cueing.cueing_result import CueingResult
+from stewart_dynamics.datasheet.datasheet_record import Datasheet
 from stewart_dynamics.identification.identification_record import IdentificationResult
 from stewart_dynamics.legs import CRANK, KINDS
 from stewart_dynamics.node.dynamics_node import BACKLOG
@@ -52,7 +53,7 @@ SCHEMA_FILE = ROOT / 'config' / SCHEMA
 DOCUMENTS: dict[str, type[Record]] = {
     'summary.schema.json': BagSummary, 'cueing.schema.json': CueingResult,
     'identification.schema.json': IdentificationResult,
-    'calibration.schema.json': CalibrationResult}
+    'calibration.schema.json': CalibrationResult, 'datasheet.schema.json': Datasheet}
 CONTROLLER_PARAMETERS = (ROOT / 'ros2_control' / 'stewart_dynamics_controller' / 'src'
                          / 'stewart_dynamics_controller_parameters.yaml')
 HEAD = '| name | type | unit | default | meaning |\n| --- | --- | --- | --- | --- |\n'
@@ -444,7 +445,8 @@ def _type_words(kind: Any) -> str:
     if origin is dict:
         return f'name: {_type_words(arguments[1])}'
     if origin is list:
-        return f'list of {_type_words(arguments[0])}s'.replace('texts', 'text')
+        words, *rest = _type_words(arguments[0]).split(' ')
+        return ' '.join(['list of', words if words == 'text' else f'{words}s', *rest])
     return {bool: 'flag', int: 'integer', float: 'number', str: 'text', tuple: 'pair'}.get(
         origin or kind, 'group')
 
@@ -477,6 +479,7 @@ def pages() -> dict[Path, dict[str, str]]:
             'keys of identification.json': document_keys(IdentificationResult)},
         ROOT / 'docs' / 'calibration.md': {
             'keys of calibration.json': document_keys(CalibrationResult)},
+        ROOT / 'docs' / 'capability.md': {'keys of datasheet.json': document_keys(Datasheet)},
         ROOT / 'docs' / 'cranks.md': {
             'parameters of cranks': rows({
                 name: parameter for name, parameter in Parameters.table.items()

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 import math
 from pathlib import Path
 from typing import Any
@@ -90,7 +90,7 @@ def _range(where: str, value: Any) -> tuple[float, float]:
     return float(bounds[0]), float(bounds[1])
 
 
-def in_words(ranges: Array) -> Mapping[str, list[float | None]]:
+def in_words(ranges: Array) -> dict[str, list[float | None]]:
     """Return the ranges by axis, for JSON: null where nothing limits."""
     return {axis: [value if math.isfinite(value) else None for value in each]
             for axis, each in zip(AXES, ranges.tolist(), strict=True)}

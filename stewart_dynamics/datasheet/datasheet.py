@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,10 @@ from stewart_dynamics.datasheet import (
     claimed_box, pose_ratings as ratings, rated_workspace as workspace)
 from stewart_dynamics.datasheet.claimed_box import largest_length, LARGEST_RULE
 from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
+from stewart_dynamics.datasheet.datasheet_record import (
+    AddedPayload, AtOnce, Box, Datasheet, Directions, RangesAtOnce, RatedPose, Tilt)
 from stewart_dynamics.datasheet.motion_ratings import judged, uses
-from stewart_dynamics.datasheet.pose_ratings import answer, AXES
+from stewart_dynamics.datasheet.pose_ratings import AXES, rate_extent
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.uncertain_payload import uncertain_payload
 from stewart_dynamics.errors import shown, StewartError
@@ -26,15 +28,13 @@ from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.program import SOFTWARE
+from stewart_dynamics.records import of_kind
 from stewart_dynamics.replay.recorded_motion import read_motion
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.block_statistics import finite
 from stewart_dynamics.reporting.results_folder import (
     check_free, DATASHEET, DATASHEET_PAGE, whole_folder, WORKSPACE)
 from stewart_dynamics.whole_file import now, write_files, write_json
-
-VERSION = 2  # version of datasheet.json; increased when the meaning of a key changes
 
 # Heights of the tilt chart, as parts of the travel along z both ways.
 _HEIGHTS = {'at the pose': 0.0, 'half way up': 0.5, 'half way down': -0.5}
@@ -72,7 +72,7 @@ STAGES = ('motion', 'travel', 'ranges at once', 'loads', 'workspace', 'page')
 
 
 def write_datasheet(parameters: Parameters, order: Order, folder: Path, options: Options,
-                    progress: Progress) -> dict[str, Any]:
+                    progress: Progress) -> Datasheet:
     """
     Write a datasheet into a folder; return the content of datasheet.json.
 
@@ -85,46 +85,49 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     recorded = None if order.bag is None else read_motion(
         order.bag, hexapod.given, order.recording, progress.read)
     progress.stage('travel')
-    sheet = _head(hexapod, order)
-    sheet['leg_clearance'] = hexapod.clearance()
-    sheet['travel'] = ratings.travel(hexapod)
+    travel, clearance = ratings.travel(hexapod), hexapod.clearance()
     progress.stage('ranges at once')
-    sheet['at_once'] = _at_once(hexapod, sheet['travel'])
-    ranges = _stated(sheet['at_once'])
-    sheet['box'] = None if order.box is None else _checked(hexapod, order.box)
+    at_once = _at_once(hexapod, travel)
+    ranges = None if at_once is None or at_once.all.factor is None else np.array(
+        [at_once.all.ranges[axis] for axis in AXES])
+    box = None if order.box is None else _checked(hexapod, order.box)
     progress.stage('loads')
-    sheet |= dict.fromkeys(('velocity', 'acceleration', 'force', 'moment', 'payload'))
-    sheet |= ratings.at_pose(hexapod)
-    sheet['uncertainty'] = (
-        uncertain_payload(hexapod, order.uncertainty) if order.uncertainty else None)
-    sheet['worst'] = None if ranges is None else ratings.worst(hexapod, ranges, _LEVELS)
-    sheet['stiffness'] = None if order.leg_stiffness is None else ratings.stiffness(
+    loads = ratings.rate_poses(hexapod, hexapod.pose[None])
+    uncertain = uncertain_payload(hexapod, order.uncertainty) if order.uncertainty else None
+    worst = None if ranges is None else ratings.worst(hexapod, ranges, _LEVELS)
+    stiffness = None if order.leg_stiffness is None else ratings.stiffness(
         hexapod, order.leg_stiffness, ranges, _LEVELS)
-    sheet['stuck_leg'] = None if order.stuck is None else ratings.stuck_leg(
-        hexapod, order.stuck)
+    stuck_leg = None if order.stuck is None else ratings.stuck_leg(hexapod, order.stuck)
     drives = ratings.drives(hexapod, ranges, _LEVELS)
-    if drives is not None:
-        sheet['drives'] = drives
     progress.stage('workspace')
     sections = {name: hexapod.section(normal) for name, normal in zip(
         workspace.PLANES, 'yxz', strict=True) if hexapod.has_sections}
     modes = {} if order.leg_stiffness is None else {
         name: workspace.frequencies(hexapod, each, workspace.PLANES[name], order.leg_stiffness)
         for name, each in sections.items()}
-    if modes:
-        sheet['stiffness']['sections'] = {name: each.listed() for name, each in modes.items()}
-    tilts = {name: workspace.tilt(hexapod, part * (sheet['travel'][
-        'z+' if part > 0.0 else 'z-']['value'] or 0.0)) for name, part in _HEIGHTS.items()}
-    sheet['tilt'] = _smallest_tilt(tilts['at the pose'], hexapod)
-    used = sheet['motion'] = None
+    if stiffness and modes:
+        stiffness.sections = {name: each.listed() for name, each in modes.items()}
+    tilts = {name: workspace.tilt(hexapod, part * (
+        (travel.z_plus if part > 0.0 else travel.z_minus).value or 0.0))
+        for name, part in _HEIGHTS.items()}
+    used = motion = None
     if recorded is not None:
         platform = StewartPlatform(hexapod.given)
         used = uses(platform, recorded)
-        sheet['motion'] = {'bag': str(order.bag)} | judged(platform, recorded, used) | {
-            'rejected': recorded.rejected, 'missing': recorded.missing,
-            'mistakes': list(recorded.mistakes), 'notices': list(recorded.notices)}
+        motion = judged(platform, recorded, used, str(order.bag))
+    sheet = of_kind(Datasheet, hexapod.given.leg_kind)(
+        date=now(), name=order.name, pose=RatedPose(
+            hexapod.origin.position.tolist(), to_euler(hexapod.origin.rotation).tolist(),
+            hexapod.pose.position.tolist(), order.pose is None),
+        pivot=hexapod.pivot.tolist(), added_payload=None if order.payload is None else
+        AddedPayload(order.payload.mass, np.asarray(order.payload.center_of_mass).tolist()),
+        leg_clearance=clearance, travel=travel, at_once=at_once, box=box,
+        velocity=loads.velocity or None, acceleration=loads.acceleration or None,
+        force=loads.force or None, moment=loads.moment or None, payload=loads.payload or None,
+        uncertainty=uncertain, worst=worst, stiffness=stiffness, stuck_leg=stuck_leg,
+        drives=drives, tilt=_smallest_tilt(tilts['at the pose'], hexapod), motion=motion,
+        parameters=hexapod.given.plain())
     progress.stage('page')
-    sheet['parameters'] = hexapod.given.plain()
     pictures = Pictures(hexapod, sheet, sections, modes, tilts, ranges,
                         None if recorded is None else recorded.seconds, used)
     with whole_folder(folder, options, DATASHEET, before) as partial:
@@ -134,49 +137,26 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     return sheet
 
 
-def _head(hexapod: RatedHexapod, order: Order) -> dict[str, Any]:
-    return {
-        'version': VERSION, 'software': SOFTWARE, 'date': now(),
-        'name': order.name,
-        'pose': {'position': hexapod.origin.position.tolist(),
-                 'angles': to_euler(hexapod.origin.rotation).tolist(),
-                 'pivot_position': hexapod.pose.position.tolist(),
-                 'home': order.pose is None},
-        'pivot': hexapod.pivot.tolist(),
-        'added_payload': None if order.payload is None else {
-            'mass': order.payload.mass,
-            'center_of_mass': np.asarray(order.payload.center_of_mass).tolist()}}
-
-
-def _at_once(hexapod: RatedHexapod, alone: dict[str, Any]) -> dict[str, Any] | None:
+def _at_once(hexapod: RatedHexapod, alone: Directions) -> AtOnce | None:
     """Return the largest ranges of translation, rotation and both that are reachable at once."""
-    travels = [[alone[f'{axis}{sign}']['value'] for sign in '-+'] for axis in AXES]
-    if any(each is None for both in travels for each in both):
+    whole = np.array([[math.nan if each.value is None else each.value
+                       for each in alone.both(axis)] for axis in AXES]) * [-1.0, 1.0]
+    if np.isnan(whole).any():
         return None
-    whole = np.array(travels) * [-1.0, 1.0]
-    found: dict[str, Any] = {}
-    for name, axes in (('translation', slice(0, 3)), ('rotation', slice(3, 6)),
-                       ('all', slice(0, 6))):
+    found = []
+    for axes in (slice(0, 3), slice(3, 6), slice(0, 6)):
         ranges = np.zeros((6, 2))
         ranges[axes] = whole[axes]
         if not np.ptp(ranges, axis=1).any():
             return None
         scaled = hexapod.reachable_factor(ranges)
-        found[name] = {
-            'ranges': claimed_box.in_words(
-                np.multiply(scaled.value, ranges, out=np.zeros((6, 2)), where=ranges != 0.0)),
-            **answer(scaled.value, scaled.limit, scaled.leg, hexapod.joints)}
-        found[name]['factor'] = found[name].pop('value')
-    return found
+        rated = rate_extent(scaled.value, scaled.limit, scaled.leg, hexapod.joints)
+        found.append(RangesAtOnce(rated.limit, rated.leg, rated.value, claimed_box.in_words(
+            np.multiply(scaled.value, ranges, out=np.zeros((6, 2)), where=ranges != 0.0))))
+    return AtOnce(*found)
 
 
-def _stated(at_once: dict[str, Any] | None) -> Array | None:
-    if at_once is None or at_once['all']['factor'] is None:
-        return None
-    return np.array([at_once['all']['ranges'][axis] for axis in AXES])
-
-
-def _checked(hexapod: RatedHexapod, ranges: Array) -> dict[str, Any]:
+def _checked(hexapod: RatedHexapod, ranges: Array) -> Box:
     """Return whether a claimed box is reachable, and its worst pose."""
     found = hexapod.reachable(ranges)
     worst = found.worst
@@ -185,27 +165,18 @@ def _checked(hexapod: RatedHexapod, ranges: Array) -> dict[str, Any]:
         factor = finite(hexapod.reachable_factor(ranges).value)
     moved = hexapod.displacement(Pose(
         worst.pose.position + worst.pose.rotation @ hexapod.pivot, worst.pose.rotation))
-    return {'possible': found.certain, 'ranges': claimed_box.in_words(ranges),
-            'factor': factor, 'limit': worst.limit,
-            'leg': hexapod.joints[worst.leg] if worst.leg >= 0 else None,
-            'excess': finite(worst.excess),
-            'displacement': dict(zip(AXES, moved, strict=True)),
-            'position': worst.pose.position,
-            'angles': to_euler(worst.pose.rotation)}
+    return Box(
+        worst.limit, hexapod.joints[worst.leg] if worst.leg >= 0 else None, found.certain, factor,
+        claimed_box.in_words(ranges), finite(worst.excess),
+        dict(zip(AXES, moved.tolist(), strict=True)), worst.pose.position.tolist(),
+        to_euler(worst.pose.rotation).tolist())
 
 
-def _smallest_tilt(boundary: workspace.Boundary, hexapod: RatedHexapod) -> dict[str, Any]:
-    """Return the tilt toward every azimuth, and the azimuth of the smallest [rad]."""
+def _smallest_tilt(boundary: workspace.Boundary, hexapod: RatedHexapod) -> Tilt:
+    """Return the smallest tilt toward any azimuth [rad]."""
     n = int(np.argmin(boundary.values))
-    found = answer(boundary.values[n], boundary.limits[n], boundary.legs[n],
-                   hexapod.joints)
-    return found | {'azimuth': 2.0 * math.pi * n / len(boundary.values)}
-
-
-def is_possible(sheet: dict[str, Any]) -> bool:
-    """Return whether the box and the motion are possible, and do not contradict themselves."""
-    return all(sheet[name] is None or sheet[name]['possible'] and not sheet[name].get('mistakes')
-               for name in ('box', 'motion'))
+    found = rate_extent(boundary.values[n], boundary.limits[n], boundary.legs[n], hexapod.joints)
+    return Tilt(found.limit, found.leg, found.value, 2.0 * math.pi * n / len(boundary.values))
 
 
 def check_order(order: Order, parameters: Parameters) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from stewart_dynamics.program import (
     add_node, add_parameters, add_reading, between, frequency, NODE, Program, whole)
@@ -81,7 +80,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.bags.find import bytes_of
     from stewart_dynamics.datasheet.claimed_box import doubtful_ranges, read_box
     from stewart_dynamics.datasheet.datasheet import (
-        check_order, is_possible, leg_of, Order, Progress, soft_legs, STAGES, write_datasheet)
+        check_order, leg_of, Order, Progress, soft_legs, STAGES, write_datasheet)
     from stewart_dynamics.datasheet.datasheet_text import sheet_text
     from stewart_dynamics.datasheet.rated_hexapod import Payload
     from stewart_dynamics.mechanics.frames.motion import Pose
@@ -125,9 +124,9 @@ def _run(given: argparse.Namespace) -> int:
             if bar.disable and name in ('ranges at once', 'workspace'):
                 _PROGRAM.complain(name)
 
-        sheet: dict[str, Any] = write_datasheet(
+        sheet = write_datasheet(
             parameters, order, given.output, options, Progress(stage, bar.update))
     _PROGRAM.say(sheet_text(sheet))
-    missing = sheet['motion']['missing'] if sheet['motion'] else []
+    missing = sheet.motion.missing if sheet.motion else []
     return _PROGRAM.end(
-        given.output, {given.motion: missing}, given.strict and not is_possible(sheet))
+        given.output, {given.motion: missing}, given.strict and not sheet.holds)

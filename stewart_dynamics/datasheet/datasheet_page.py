@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,10 +16,11 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.bags.find import RESULT
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet import charts
+from stewart_dynamics.datasheet.datasheet_record import Datasheet, Rating
 from stewart_dynamics.datasheet.datasheet_text import (
-    between_setpoints, both_payloads, both_ways, box_verdict, DEGREE, down, limit_name, LINEAR, MM,
+    between_setpoints, both_ways, box_verdict, DEGREE, down, limit_name, LINEAR, MM,
     motion_verdict, numbers, OF_DRIVES, payloads_in_words, pose_row, possible, rated_payload,
-    setpoints_used, span, stuck_rows, TORQUES, uncertain_line, Unit, unit_of)
+    setpoints_used, span, stuck_row, TORQUES, uncertain_line, Unit, unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
 from stewart_dynamics.datasheet.pose_ratings import AXES, grid, Payloads, poses_of
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
@@ -41,7 +42,7 @@ class Pictures(NamedTuple):
     """Content of the pictures."""
 
     hexapod: RatedHexapod
-    sheet: Mapping[str, Any]
+    sheet: Datasheet
     sections: Mapping[str, Section]
     modes: Mapping[str, Frequencies]
     tilts: Mapping[str, Boundary]
@@ -53,8 +54,8 @@ class Pictures(NamedTuple):
         """Return the drawing of the hexapod, with the ends of its travel along z."""
         origin = self.hexapod.origin
         ends = [Pose(origin.position + [0.0, 0.0, sign * by], origin.rotation)
-                for key, sign in (('z+', 1.0), ('z-', -1.0))
-                if (by := self.sheet['travel'][key]['value'])]
+                for each, sign in ((self.sheet.travel.z_plus, 1.0),
+                                   (self.sheet.travel.z_minus, -1.0)) if (by := each.value)]
         return Drawing(self.hexapod.given, origin, tuple(ends), self.hexapod.pivot)
 
     def workspace(self) -> list[Picture]:
@@ -65,15 +66,14 @@ class Pictures(NamedTuple):
             self.sections[name], each, self.hexapod.origin.position, PLANES[name])
             for name, each in self.modes.items() if np.isfinite(each.values).any()]
         found.append(charts.tilt_chart(list(self.tilts.values()), list(self.tilts)))
-        low, high = (self.sheet['travel'][key]['value'] for key in ('z-', 'z+'))
+        low, high = (each.value for each in self.sheet.travel.both('z'))
         if low and high:
             heights, turns = rotations_over_height(self.hexapod, -low, high)
             found.append(charts.curves_chart(
                 'Rotation over height', MM.factor * heights,
                 {f'±{name}': DEGREE.factor * each for name, each in turns.items()}, 'Z [mm]',
                 'rotation [°]'))
-        payload = self.sheet['payload']
-        if payload is not None and self.hexapod.given['gravity'].any():
+        if self.sheet.payload is not None and self.hexapod.given['gravity'].any():
             found.append(self._payload())
         return found
 
@@ -110,36 +110,35 @@ class Pictures(NamedTuple):
                                 self.hexapod.given['setpoint.timeout'])
 
 
-def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pictures: Pictures,
+def write_page(path: Path, sheet: Datasheet, hexapod: RatedHexapod, pictures: Pictures,
                torque_unit: str) -> None:
     """Write datasheet.html, with the content of datasheet.json; torque_unit: one of TORQUES."""
-    drawing, kind = pictures.drawing(), hexapod.given.leg_kind
-    bag = Path(sheet['motion']['bag']) if sheet['motion'] else Path()
+    drawing, kind, motion = pictures.drawing(), hexapod.given.leg_kind, sheet.motion
+    bag = Path(motion.bag) if motion else Path()
     name = (bag if bag.is_dir() else bag.with_suffix('')).name
     text = page(
-        _FOLDER, 'datasheet', document=True, s=sheet, key_figures=_key_figures(sheet, hexapod),
-        summary=_summary(hexapod), legs=hexapod.joints, travel=_travel(sheet, hexapod),
-        rates=_rates(sheet, hexapod), loads=_loads(sheet, hexapod), stiffness=_stiffness(sheet),
+        _FOLDER, 'datasheet', document=True, s=sheet, key_figures=_key_figures(sheet),
+        summary=_summary(hexapod), legs=hexapod.joints, ends=partial(_ends, hexapod.joints),
         drive_heads=_drive_heads(sheet, hexapod, torque_unit),
         joints=_joints(sheet, hexapod, torque_unit),
         properties=_properties(sheet, hexapod, torque_unit), drive_unit=_drive_unit(hexapod),
         position=kind.position.name, kind=kind,
         rate_phrase=LIMITS[kind.rate_limit].phrase, effort_phrase=LIMITS[kind.effort_limit].phrase,
-        verdicts=[(name.capitalize(), found, words(found)) for name, words in (
-            ('motion', motion_verdict), ('box', box_verdict)) if (found := sheet[name])],
+        verdicts=[*([('Motion', motion, motion_verdict(motion))] if motion else []),
+                  *([('Box', sheet.box, box_verdict(sheet.box))] if sheet.box else [])],
         report=link_to_other(path, [
             Path(name, REPORT_PAGE), Path(REPLAYS, name, REPORT_PAGE)], RESULT,
-            sheet['parameters']) if name else None,
+            sheet.parameters) if name else None,
         oblique=drawing.oblique().svg(), front=drawing.front().svg(), top=drawing.top().svg(),
         workspace=[each.svg() for each in pictures.workspace()],
         motion=(chart.svg() if (chart := pictures.motion()) else None),
-        between_setpoints=between_setpoints(sheet['motion']) if sheet['motion'] else '',
+        between_setpoints=between_setpoints(motion) if motion else '',
         dashes={name: charts.DASHES[name] for name in pictures.limits()},
         payloads=payloads_in_words(sheet),
-        uncertain=uncertain_line(sheet['uncertainty']) if sheet['uncertainty'] else '',
-        stuck=stuck_rows(sheet['stuck_leg']) if sheet['stuck_leg'] else None,
+        uncertain=uncertain_line(sheet.uncertainty) if sheet.uncertainty else '',
+        stuck=list(map(stuck_row, sheet.stuck_leg.motions)) if sheet.stuck_leg else None,
         limit_name=limit_name, possible=possible, setpoints_used=setpoints_used, down=down,
-        span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
+        span=span, both_ways=both_ways, unit_of=unit_of, MM=MM, DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})
 
 
@@ -156,28 +155,27 @@ def _summary(hexapod: RatedHexapod) -> str:
     return ' · '.join(parts)
 
 
-def _key_figures(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[str, str, str]]:
+def _key_figures(sheet: Datasheet) -> list[tuple[str, str, str]]:
     """Return name, value and unit of the first figures to be looked for."""
-    travel = sheet['travel']
-    found = [(f'Travel {_NAMES[axis]}', both_ways(travel, axis, unit_of(axis, 'travel')),
-              unit_of(axis, 'travel').name) for axis in ('x', 'y', 'z')]
-    found.append(('Tilt, every direction', f'±{down(DEGREE.factor * sheet["tilt"]["value"])}'
-                  if sheet['tilt']['value'] is not None else '–', '°'))
-    found.append(('Rotation θZ', both_ways(travel, 'rz', DEGREE), '°'))
-    if sheet['payload'] is not None:
-        for kind, payload in both_payloads(sheet):
-            any_orientation, value = rated_payload(sheet, payload)
-            found.append((f'Payload{kind and f", {kind}"}{any_orientation}', down(value), 'kg'))
-        found.append(('Force, every direction', down(sheet['force']['every_direction']), 'N'))
-    if 'drives' in sheet and sheet['drives']['worst_lever']:
-        found.append(('Lever, smallest', down(100.0 * sheet['drives']['worst_lever']['value']),
-                      '%'))
-    if sheet['velocity'] is not None:
-        found.append(('Velocity Z', both_ways(sheet['velocity'], 'z', LINEAR['velocity']), 'mm/s'))
+    found = [(f'Travel {_NAMES[axis]}', both_ways(sheet.travel, axis, MM), MM.name)
+             for axis in ('x', 'y', 'z')]
+    tilt = sheet.tilt.value
+    found.append(('Tilt, every direction', '–' if tilt is None else
+                  f'±{down(DEGREE.factor * tilt)}', '°'))
+    found.append(('Rotation θZ', both_ways(sheet.travel, 'rz', DEGREE), '°'))
+    for kind, payload in sheet.payloads:
+        any_orientation, value = rated_payload(payload, sheet.parameters)
+        found.append((f'Payload{kind and f", {kind}"}{any_orientation}', down(value), 'kg'))
+    if sheet.force is not None:
+        found.append(('Force, every direction', down(sheet.force.every_direction), 'N'))
+    if sheet.drives and sheet.drives.worst_lever:
+        found.append(('Lever, smallest', down(100.0 * sheet.drives.worst_lever.value), '%'))
+    if sheet.velocity is not None:
+        found.append(('Velocity Z', both_ways(sheet.velocity, 'z', LINEAR['velocity']), 'mm/s'))
     return found
 
 
-class _Limit(NamedTuple):
+class _End(NamedTuple):
     """Sign of a direction (empty: both), and the limit and leg that end its extent."""
 
     sign: str
@@ -185,90 +183,13 @@ class _Limit(NamedTuple):
     leg: int
 
 
-def _limits(values: Mapping[str, Any], axis: str, joints: tuple[str, ...]) -> list[_Limit]:
+def _ends(joints: Sequence[str], minus: Rating, plus: Rating) -> list[_End]:
     """Return what ends the extents of an axis, once if it is the same both ways."""
-    found = [_Limit(sign, each['limit'], joints.index(each['leg']) if each['leg'] else -1)
-             for key, sign in (('-', '−'), ('+', '+'))
-             if (each := values[f'{axis}{key}'])['limit']]
+    found = [_End(sign, each.limit, joints.index(each.leg) if each.leg else -1)
+             for each, sign in ((minus, '−'), (plus, '+')) if each.limit]
     if len(found) == 2 and found[0][1:] == found[1][1:]:
         return [found[0]._replace(sign='')]
     return found
-
-
-def _travel(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[dict[str, Any]]:
-    rows, at_once = [], sheet['at_once']
-    for axis in AXES:
-        unit = unit_of(axis, 'travel')
-        kind = 'rotation' if axis.startswith('r') else 'translation'
-        rows.append({
-            'axis': _NAMES[axis], 'unit': unit.name,
-            'alone': both_ways(sheet['travel'], axis, unit),
-            'limits': _limits(sheet['travel'], axis, hexapod.joints),
-            'three': at_once and span(at_once[kind]['ranges'][axis], unit),
-            'all': at_once and span(at_once['all']['ranges'][axis], unit)})
-    return rows
-
-
-def _rates(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[dict[str, Any]]:
-    rows = []
-    for axis in AXES:
-        row: dict[str, Any] = {'axis': _NAMES[axis]}
-        for name in ('velocity', 'acceleration'):
-            if sheet[name] is None:
-                continue
-            unit = unit_of(axis, name)
-            row[name] = {
-                'unit': unit.name, 'value': both_ways(sheet[name], axis, unit),
-                'limits': _limits(sheet[name], axis, hexapod.joints),
-                'worst': both_ways(sheet['worst'][name], axis, unit) if sheet['worst'] else '–'}
-        rows.append(row)
-    return rows
-
-
-def _loads(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[dict[str, Any]]:
-    if sheet['force'] is None:
-        return []
-    rows, worst = [], sheet['worst']
-
-    def row(name: str, unit: str, kind: str, text: Callable[[Any], str], axis: str = '',
-            of_axis: bool = True) -> dict[str, Any]:
-        held = sheet[kind].get('continuous')
-        ends = (sheet[kind] if axis else {'x-': sheet[kind], 'x+': sheet[kind]}) if of_axis else {}
-        return {'name': name, 'unit': unit, 'value': text(sheet[kind]), 'sum': not axis,
-                'limits': _limits(ends, axis or 'x', hexapod.joints) if ends else [],
-                'continuous': text(held) if held else None,
-                'worst': text(worst[kind]) if worst else '–'}
-
-    for axis in AXES:
-        name = 'moment' if axis.startswith('r') else 'force'
-        unit = unit_of(axis, name)
-        rows.append(row(f'{name.capitalize()} {_NAMES[axis].replace("θ", "")}', unit.name, name,
-                        partial(both_ways, axis=axis, unit=unit), axis))
-        if axis in ('z', 'rz'):
-            rows.append(row(f'{name.capitalize()}, every direction', unit.name, name,
-                            lambda found: down(found['every_direction']), of_axis=False))
-    return [*rows,
-            row('Payload at the pivot', 'kg', 'payload', lambda found: down(found['value'])),
-            row('Payload, base in any orientation', 'kg', 'payload',
-                lambda found: down(found['any_orientation']), of_axis=False)]
-
-
-def _stiffness(sheet: Mapping[str, Any]) -> list[dict[str, Any]]:
-    found = sheet['stiffness']
-    if found is None:
-        return []
-    rows = []
-    for axis in AXES:
-        unit = unit_of(axis, 'stiffness')
-        rows.append({'name': f'Stiffness {_NAMES[axis]}', 'unit': unit.name,
-                     'value': down(found[axis] * unit.factor),
-                     'worst': down(found['worst'][axis] * unit.factor) if found['worst'] else '–'})
-    worst = found['worst']
-    for n, frequency in enumerate(found['frequencies'][:2]):
-        rows.append({'name': f'{("Lowest", "Second")[n]} natural frequency', 'unit': 'Hz',
-                     'value': down(frequency),
-                     'worst': down(worst['frequencies'][n]) if worst else '–'})
-    return rows
 
 
 def _drive_unit(hexapod: RatedHexapod) -> Unit:
@@ -280,18 +201,18 @@ def _position_unit(hexapod: RatedHexapod) -> Unit:
     return {'m': MM, 'rad': DEGREE}[hexapod.given.leg_kind.position.unit]
 
 
-def _drive_heads(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: str) -> list[str]:
+def _drive_heads(sheet: Datasheet, hexapod: RatedHexapod, torque_unit: str) -> list[str]:
     """Return the heads of the columns of the drives."""
     kind, unit = hexapod.given.leg_kind, _position_unit(hexapod).name
     heads = [f'{kind.position.name} [{unit}]', f'range [{unit}]']
-    if 'drives' in sheet:
+    if sheet.drives:
         heads += ['lever [%]', f'{kind.effort.name} at rest [{TORQUES[torque_unit].name}]']
     return heads
 
 
-def _joints(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: str,
-            ) -> list[dict[str, Any]]:
-    """Return a row for each leg: joints in mm, and its drive with its range."""
+def _joints(sheet: Datasheet, hexapod: RatedHexapod, torque_unit: str,
+            ) -> list[tuple[str, Array, Array, list[str]]]:
+    """Return name, joints in mm, and drive with its range, for each leg."""
     p, unit, rows = hexapod.given, _position_unit(hexapod), []
     positions = hexapod.platform.inverse_kinematics(hexapod.pose)
     for n, name in enumerate(hexapod.joints):
@@ -299,12 +220,11 @@ def _joints(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: str,
         cells = [number(shown, 1), ' to '.join(
             '–' if p[limit] is None else f'{unit.factor * p[limit][n]:.6g}'.replace('-', '−')
             for limit in p.leg_kind.position_limits)]
-        if 'drives' in sheet:
-            drives = sheet['drives']
-            cells += [number(100.0 * float(drives['lever_ratios'][n]), 1), digits(
-                TORQUES[torque_unit].factor * float(drives[p.leg_kind.effort.field][n]))]
-        rows.append({'leg': name, 'base': 1e3 * p.geometry.base_joints[n],
-                     'platform': 1e3 * p.geometry.platform_joints[n], 'drive': cells})
+        if sheet.drives:
+            cells += [number(100.0 * sheet.drives.lever_ratios[n], 1),
+                      digits(TORQUES[torque_unit].factor * sheet.drives.efforts[n])]
+        rows.append((name, 1e3 * p.geometry.base_joints[n], 1e3 * p.geometry.platform_joints[n],
+                     cells))
     return rows
 
 
@@ -318,7 +238,7 @@ def _in_unit(value: Any, unit: str, torque_unit: str) -> str:
     return numbers(value, 1.0, f' {unit}'.rstrip())
 
 
-def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: str,
+def _properties(sheet: Datasheet, hexapod: RatedHexapod, torque_unit: str,
                 ) -> list[tuple[str, str]]:
     """Return names and values of the other parameters that the figures rest on."""
     p = hexapod.given
@@ -327,10 +247,10 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: st
     inertia = inertia_matrix(p.carried.inertia)
 
     rows = [
-        pose_row(sheet['pose']),
-        ('Pivot, platform frame', numbers(sheet['pivot'], 1e3, ' mm')),
-        *([('Pivot at the rated pose', numbers(sheet['pose']['pivot_position'], 1e3, ' mm'))]
-          if any(sheet['pivot']) else []),
+        pose_row(sheet.pose),
+        ('Pivot, platform frame', numbers(sheet.pivot, 1e3, ' mm')),
+        *([('Pivot at the rated pose', numbers(sheet.pose.pivot_position, 1e3, ' mm'))]
+          if any(sheet.pivot) else []),
         ('Platform' + (' with payload' if p.payload.mass > 0.0 else ''),
          f'{p.carried.mass:.5g} kg at {numbers(p.carried.center, 1e3, " mm")}'),
         ('Its inertia, xx yy zz', numbers(np.diagonal(inertia), 1.0, ' kg m²')),
@@ -349,8 +269,8 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod, torque_unit: st
                 unit = PARAMETERS[name].unit.replace('^2', '²')
                 rows.append((name, _in_unit(value, unit, torque_unit)
                              if isinstance(value, np.ndarray) else str(value)))
-    if sheet['leg_clearance'] is not None:
+    if sheet.leg_clearance is not None:
         rows.append(('Clearance between legs at the pose',
-                     numbers(sheet['leg_clearance'], 1e3, ' mm')))
+                     numbers(sheet.leg_clearance, 1e3, ' mm')))
     rows.append(('singularity.stop_condition', f'{p.singularity.stop_condition:g}'))
     return rows

@@ -16,11 +16,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stewart_dynamics.datasheet.datasheet_record import (
+    AlongAxes, Box, Claim, Datasheet, HeldPayload, JudgedMotion, Limited, MotionBetween, RatedPose,
+    RemainingMotion, StuckLeg, UncertainPayload)
 from stewart_dynamics.datasheet.pose_ratings import AXES
 from stewart_dynamics.datasheet.possible_motion import in_words
 from stewart_dynamics.mechanics.limits import (
     LIMITS, POSE, short_name, SINGULARITY, TORQUE_CONTINUOUS)
 from stewart_dynamics.parameters.table import FIXED
+from stewart_dynamics.records import Value
 from stewart_dynamics.reporting.pages import MOST_PLAIN, typeset
 
 _DIGITS = 4
@@ -74,9 +78,9 @@ def down(value: float | None) -> str:
     return typeset(f'{shortened:,f}' if plain else f'{shortened:.{_DIGITS - 1}e}')
 
 
-def both_ways(values: Mapping[str, Any], axis: str, unit: Unit) -> str:
+def both_ways(values: AlongAxes, axis: str, unit: Unit) -> str:
     """Return the extents of an axis to minus and plus: ±1.5, or −1.2 … +1.5."""
-    minus, plus = (values[f'{axis}{sign}']['value'] for sign in '-+')
+    minus, plus = (each.value for each in values.both(axis))
     return span((None if minus is None else -minus, plus), unit)
 
 
@@ -101,185 +105,163 @@ def numbers(values: Any, factor: float = 1.0, unit: str = '') -> str:
     return f'{", ".join(texts)}{unit}'.replace('-', '−')
 
 
-def pose_row(pose: Mapping[str, Any]) -> tuple[str, str]:
+def pose_row(pose: RatedPose) -> tuple[str, str]:
     """Return name and numbers of the rated pose."""
-    return 'Rated pose' + (', home' if pose['home'] else ''), (
-        numbers(pose['position'], 1e3, ' mm') + '; '
-        + numbers(pose['angles'], DEGREE.factor, '°'))
+    return 'Rated pose' + (', home' if pose.home else ''), (
+        numbers(pose.position, 1e3, ' mm') + '; ' + numbers(pose.angles, DEGREE.factor, '°'))
 
 
-def sheet_text(sheet: dict[str, Any]) -> str:
+def sheet_text(sheet: Datasheet) -> str:
     """Return rated pose, travel, payload, and whether box and motion are possible."""
-    at_once = sheet['at_once']
-    lines = [f'{sheet["name"]}: ' + ': '.join(pose_row(sheet['pose'])).lower(),
+    at_once, motion = sheet.at_once, sheet.motion
+    lines = [f'{sheet.name}: ' + ': '.join(pose_row(sheet.pose)).lower(),
              'travel of each axis alone' + (', all at once' if at_once else '')]
     for axis in AXES:
         unit = unit_of(axis, 'travel')
-        line = f'  {axis:<3} {both_ways(sheet["travel"], axis, unit):>20} {unit.name:<3}'
+        line = f'  {axis:<3} {both_ways(sheet.travel, axis, unit):>20} {unit.name:<3}'
         if at_once:
-            ranges = span(at_once['all']['ranges'][axis], unit)
-            line += f' {ranges:>20} {unit.name}'
+            line += f' {span(at_once.all.ranges[axis], unit):>20} {unit.name}'
         lines.append(line.rstrip())
-    if sheet['payload'] is not None:
-        for kind, payload in both_payloads(sheet):
-            any_orientation, value = rated_payload(sheet, payload)
-            limit = f', by {_limit(payload)}' if payload['limit'] and not any_orientation else ''
-            lines.append(f'payload at the pivot, at rest{kind and f", {kind}"}{any_orientation}: '
-                         f'{down(value)} kg{limit}')
-    if sheet['uncertainty']:
-        lines.append(uncertain_line(sheet['uncertainty']))
-    if sheet['stuck_leg']:
-        lines += stuck_lines(sheet['stuck_leg'])
-    for name, words in (('box', box_verdict), ('motion', motion_verdict)):
-        if sheet[name]:
-            lines.append(f'{name} {possible(sheet[name])}: {words(sheet[name])}')
-    motion = sheet['motion']
+    for kind, payload in sheet.payloads:
+        any_orientation, value = rated_payload(payload, sheet.parameters)
+        limit = f', by {_limit(payload)}' if payload.limit and not any_orientation else ''
+        lines.append(f'payload at the pivot, at rest{kind and f", {kind}"}{any_orientation}: '
+                     f'{down(value)} kg{limit}')
+    if sheet.uncertainty:
+        lines.append(uncertain_line(sheet.uncertainty))
+    if sheet.stuck_leg:
+        lines += stuck_lines(sheet.stuck_leg)
+    if sheet.box:
+        lines.append(f'box {possible(sheet.box)}: {box_verdict(sheet.box)}')
     if motion:
-        lines.append(f'  {setpoints_used(motion)}')
-        lines += [f'  {notice}' for notice in motion['notices']]
-        if not motion.get('mistakes') and motion['payload'] and (
-                motion['payload']['value'] is not None):
+        lines += [f'motion {possible(motion)}: {motion_verdict(motion)}',
+                  f'  {setpoints_used(motion.samples, motion.rejected)}',
+                  *(f'  {notice}' for notice in motion.notices)]
+        if not motion.mistakes and motion.payload and motion.payload.value is not None:
             lines.append('  payload at the pivot that can be added in the motion: '
-                         f'{down(motion["payload"]["value"])} kg')
+                         f'{down(motion.payload.value)} kg')
     return '\n'.join(lines)
 
 
-def uncertain_line(found: Mapping[str, Any]) -> str:
+def uncertain_line(found: UncertainPayload) -> str:
     """Return the band of the payload over the hexapods that the file admits."""
-    count, band = found['hexapods'], found['payload']
-    if band['low'] is None:
+    count, band = found.hexapods, found.payload
+    if band.low is None:
         return f'payload of {count} hexapods that the file admits: not limited'
     text = (f'payload at the pivot, at rest, of 95 % of {count} hexapods that the file admits: '
-            f'{down(band["low"])} to {down(band["high"])} kg')
-    return text + (f'; {100.0 * found["overloaded"] / count:.3g} % carry no payload'
-                   if found['overloaded'] else '')
+            f'{down(band.low)} to {down(band.high)} kg')
+    return text + (f'; {100.0 * found.overloaded / count:.3g} % carry no payload'
+                   if found.overloaded else '')
 
 
-def stuck_lines(found: Mapping[str, Any]) -> list[str]:
+def stuck_lines(found: StuckLeg) -> list[str]:
     """Return lines about the motions that remain with a stuck leg."""
-    lines = [f'{found["leg"]} stuck: five motions remain, x y z [m/s] rx ry rz [rad/s]']
-    for row in stuck_rows(found):
-        lines.append(f'  {row["motion"]:<52} {row["velocity"]:>8} times, {row["load"]}')
-    if found['payload'] is not None:
-        lines.append(f'  payload at the pivot, at rest: {down(found["payload"]["value"])} kg')
+    lines = [f'{found.leg} stuck: five motions remain, x y z [m/s] rx ry rz [rad/s]']
+    for motion, velocity, load in map(stuck_row, found.motions):
+        lines.append(f'  {motion:<52} {velocity:>8} times, {load}')
+    if found.payload is not None:
+        lines.append(f'  payload at the pivot, at rest: {down(found.payload.value)} kg')
     return lines
 
 
-def stuck_rows(found: Mapping[str, Any]) -> list[dict[str, str]]:
-    """Return motion, speed and load of each motion that remains, as text."""
-    rows = []
-    for row in found['motions']:
-        speed, *loads = ('–' if row[key] is None else down(row[key]['value'])
-                         for key in ('velocity', 'load+', 'load-'))
-        rows.append({'motion': ' '.join(typeset(f'{each + 0.0:+.3f}') for each in row['motion']),
-                     'velocity': speed, 'load': f'+{loads[0]} / −{loads[1]}'})
-    return rows
+def stuck_row(row: RemainingMotion) -> tuple[str, str, str]:
+    """Return motion, speed and load of a motion that remains, as text."""
+    speed, *loads = ('–' if each is None else down(each.value)
+                     for each in (row.velocity, row.load_plus, row.load_minus))
+    return (' '.join(typeset(f'{each + 0.0:+.3f}') for each in row.motion), speed,
+            f'+{loads[0]} / −{loads[1]}')
 
 
-def both_payloads(sheet: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
-    """Return the payload at rest, or those of peak and continuous torque with their kind."""
-    found = sheet['payload']
-    if 'continuous' not in found:
-        return [('', found)]
-    return [('continuous', found['continuous']), ('peak', found)]
-
-
-def payloads_in_words(sheet: Mapping[str, Any]) -> str:
+def payloads_in_words(sheet: Datasheet) -> str:
     """Return the payloads at rest with the limits that end them; empty without a limit."""
-    if sheet['payload'] is None:
-        return ''
     return ', '.join(
-        f'{kind and f"{kind} "}{down(each["value"])} kg'
-        + (f' by {_limit(each)}' if each['limit'] else '')
-        for kind, each in both_payloads(sheet))
+        f'{kind and f"{kind} "}{down(each.value)} kg'
+        + (f' by {_limit(each)}' if each.limit else '') for kind, each in sheet.payloads)
 
 
-def rated_payload(sheet: Mapping[str, Any], payload: Mapping[str, Any],
+def rated_payload(payload: HeldPayload, parameters: Mapping[str, Value],
                   ) -> tuple[str, float | None]:
     """Return a payload at rest; of any orientation of the base, and so named, if that moves."""
-    if sheet['parameters']['base.source'] != FIXED and payload['any_orientation'] is not None:
-        return ', base in any orientation', payload['any_orientation']
-    return '', payload['value']
+    if parameters['base.source'] != FIXED and payload.any_orientation is not None:
+        return ', base in any orientation', payload.any_orientation
+    return '', payload.value
 
 
-def possible(found: Mapping[str, Any]) -> str:
+def possible(found: Claim) -> str:
     """Return whether a box or motion is possible, in words."""
-    if found.get('mistakes'):
+    if isinstance(found, JudgedMotion) and found.mistakes:
         return 'not judged, its messages contradict each other or the parameters'
-    return 'possible' if found['possible'] else 'not possible'
+    return 'possible' if found.possible else 'not possible'
 
 
-def setpoints_used(motion: Mapping[str, Any]) -> str:
+def setpoints_used(samples: int, rejected: int) -> str:
     """Return how many setpoints a motion has, and how many messages were rejected."""
-    text = f'{motion["samples"]} setpoints'
-    return f'{text} used, {motion["rejected"]} messages rejected' if motion['rejected'] else text
+    text = f'{samples} setpoints'
+    return f'{text} used, {rejected} messages rejected' if rejected else text
 
 
-def motion_verdict(found: dict[str, Any]) -> str:
+def motion_verdict(found: JudgedMotion) -> str:
     """Return how much faster a motion can be, and its limit; or why it is not judged."""
-    if found.get('mistakes'):
-        return '; '.join(found['mistakes'])
-    text = _fastest(found)
-    larger = found['amplitude']
-    if found['factor'] != 0.0 and larger and larger['value'] is not None:
-        text += (f'; up to {down(larger["value"])} times as large about its first pose, limited '
+    if found.mistakes:
+        return '; '.join(found.mistakes)
+    text, larger = _fastest(found), found.amplitude
+    if found.factor != 0.0 and larger and larger.value is not None:
+        text += (f'; up to {down(larger.value)} times as large about its first pose, limited '
                  f'by {_limit(larger)}')
-    changes = in_words(found['possible_with'])
+    changes = in_words(found.possible_with)
     return f'{text}; {changes}' if changes else text
 
 
-def _fastest(found: dict[str, Any]) -> str:
+def _fastest(found: JudgedMotion | MotionBetween) -> str:
     """Return the factor of a motion's speed, and its limit."""
-    factor = found['factor']
+    factor = found.factor
     if factor is None:
         return 'no limit at any speed'
-    where = f'{_limit(found)} at {found["at_s"]:.3f} s' if found['at_s'] is not None else (
-        _limit(found))
+    where = _limit(found) + ('' if found.at_s is None else f' at {found.at_s:.3f} s')
     if factor == 0.0:
         return f'at no speed, by {where}'
     return f'up to {down(factor)} times as fast, limited by {where}'
 
 
-def between_setpoints(found: dict[str, Any]) -> str:
+def between_setpoints(found: JudgedMotion) -> str:
     """Return a sentence on the limits between the setpoints of a motion."""
-    between = found['between_setpoints']
-    if between is None or found.get('mistakes'):
+    between = found.between_setpoints
+    if between is None or found.mistakes:
         return 'Limits are checked at the setpoints.'
-    if between['reason'] is not None:
-        return f'Checked at the setpoints, not between them: {between["reason"]}.'
-    same = all(between[key] == found[key] for key in ('limit', 'leg')) and (
-        down(between['factor']) == down(found['factor']))
+    if between.reason is not None:
+        return f'Checked at the setpoints, not between them: {between.reason}.'
+    same = (between.limit, between.leg, down(between.factor)) == (
+        found.limit, found.leg, down(found.factor))
     return ('Speed between the setpoints as in a planned trajectory: '
             f'{"the same" if same else _fastest(between)}.')
 
 
-def box_verdict(found: dict[str, Any]) -> str:
+def box_verdict(found: Box) -> str:
     """Return how much larger a box can be, or the limit that is exceeded in it."""
-    factor = '' if found['factor'] is None else (
-        f'up to {down(found["factor"])} times as large')
-    if found['possible']:
+    factor = '' if found.factor is None else f'up to {down(found.factor)} times as large'
+    if found.possible:
         return f'all of it is reachable, {factor}' if factor else 'all of it is reachable'
     moved = ', '.join(
         f'{axis} {down(each * unit.factor)} {unit.name}'
-        for axis, each in found['displacement'].items()
+        for axis, each in found.displacement.items()
         if each and (unit := unit_of(axis, 'travel')))
     text = f'{_exceeded(found)} at {moved or "the rated pose"}'
     return text + (f'; reachable {factor}' if factor else '')
 
 
-def _limit(found: Mapping[str, Any]) -> str:
-    text = limit_name(found['limit'])
-    return f'{text} ({found["leg"]})' if found['leg'] else text
+def _limit(found: Limited) -> str:
+    text = limit_name(found.limit or '')
+    return f'{text} ({found.leg})' if found.leg else text
 
 
-def _exceeded(found: dict[str, Any]) -> str:
+def _exceeded(found: Box) -> str:
     """Return by how much a box exceeds a limit."""
-    excess, limit = found['excess'], _limit(found)
+    excess, limit = found.excess, _limit(found)
     if excess is None:
         return f'{limit} between the rated pose and a pose'
     if excess <= 0.0:
         return f'not proven: no pose exceeds a limit as far as searched, {limit} is nearest'
-    if found['limit'] == SINGULARITY:
+    if found.limit == SINGULARITY:
         return f'{limit}: condition number exceeded by {down(excess)}'
-    unit = _OF_LIMITS[found['limit']]
+    unit = _OF_LIMITS[found.limit or '']
     return f'{limit} exceeded by {down(excess * unit.factor)} {unit.name}'.rstrip()

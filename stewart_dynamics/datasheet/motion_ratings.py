@@ -5,14 +5,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
+from msgspec.structs import replace
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.capability.capability import Capability
+from stewart_dynamics.capability.capability import Capability, Extent
 from stewart_dynamics.capability.motor_bounds import MotorBounds
-from stewart_dynamics.datasheet.pose_ratings import answer
+from stewart_dynamics.datasheet.datasheet_record import JudgedMotion, MotionBetween
+from stewart_dynamics.datasheet.pose_ratings import rate_extent
 from stewart_dynamics.datasheet.possible_motion import possible_changes
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.legs.kind import LegKind
@@ -101,41 +103,40 @@ def is_possible(used: dict[str, Array]) -> bool:
         each.max() <= 1.0 + limits.TOLERANCE for each in used.values()))
 
 
-def judged(platform: StewartPlatform, recorded: RecordedMotion,
-           used: dict[str, Array]) -> dict[str, Any]:
+def judged(platform: StewartPlatform, recorded: RecordedMotion, used: dict[str, Array],
+           bag: str = '') -> JudgedMotion:
     """Return whether a motion is possible, how much faster it could be, and its payload."""
-    c, p = Capability(platform), platform.parameters
-    joints = p.joints
+    c, joints = Capability(platform), platform.parameters.joints
+    possible, limited = is_possible(used), c.limits_rates or c.limits_forces
     worst = max(used, key=lambda name: float(used[name].max()))
-    sample = int(used[worst].argmax())
-    singular = used[SINGULARITY].max() >= 1.0
-    found: dict[str, Any] = {
-        'possible': is_possible(used),
-        'samples': len(recorded.seconds), 'duration_s': recorded.seconds[-1],
-        'largest_use': {name: finite(each.max()) for name, each in used.items()},
-        'largest_use_limit': worst, 'largest_use_at_s': recorded.seconds[sample]}
-    if found['possible'] and not (c.limits_rates or c.limits_forces):
-        found |= {'factor': None, 'limit': None, 'leg': None, 'at_s': None}
-    else:
-        speed = c.speed_factor(recorded.motion, recorded.wrench, recorded.base)
-        found |= _named('factor', speed, recorded, joints)
-    amplitude = payload = between = None
-    if found['factor'] != 0.0 and (c.limits_rates or c.limits_forces):
-        between = _between(c, recorded, joints)
-    if len(recorded.seconds) <= _MOST and not singular:
-        larger = c.amplitude_factor(recorded.motion, None, recorded.wrench, recorded.base)
-        amplitude = answer(larger.value, larger.limit, larger.leg, joints)
-    if c.limits_forces and found['factor'] != 0.0:
-        more = c.payload(
-            recorded.motion, np.zeros(3), wrench=recorded.wrench, base=recorded.base)
-        payload = answer(more.value, more.limit, more.leg, joints)
-    changes = [] if found['possible'] or recorded.mistakes else possible_changes(
-        platform, recorded, lambda each: is_possible(uses(platform, each)))
-    return found | {'between_setpoints': between, 'amplitude': amplitude, 'payload': payload,
-                    'possible_with': changes}
+    speed = MotionBetween(None, None, None, None)
+    if not possible or limited:
+        speed = _fastest(c.speed_factor(recorded.motion, recorded.wrench, recorded.base),
+                         recorded, joints)
+    amplitude = payload = None
+    if len(recorded.seconds) <= _MOST and used[SINGULARITY].max() < 1.0:
+        amplitude = rate_extent(*c.amplitude_factor(
+            recorded.motion, None, recorded.wrench, recorded.base)[:3], joints=joints)
+    if c.limits_forces and speed.factor != 0.0:
+        payload = rate_extent(*c.payload(
+            recorded.motion, np.zeros(3), wrench=recorded.wrench, base=recorded.base)[:3],
+            joints=joints)
+    return JudgedMotion(
+        speed.limit, speed.leg, possible, speed.factor, bag=bag, at_s=speed.at_s,
+        samples=len(recorded.seconds), duration_s=float(recorded.seconds[-1]),
+        largest_use={name: finite(each.max()) for name, each in used.items()},
+        largest_use_limit=worst,
+        largest_use_at_s=float(recorded.seconds[int(used[worst].argmax())]),
+        between_setpoints=_between(c, recorded, joints) if limited and speed.factor != 0.0
+        else None, amplitude=amplitude, payload=payload,
+        possible_with=[] if possible or recorded.mistakes else possible_changes(
+            platform, recorded, lambda each: is_possible(uses(platform, each))),
+        rejected=recorded.rejected, missing=recorded.missing, mistakes=list(recorded.mistakes),
+        notices=list(recorded.notices))
 
 
-def _between(capability: Capability, recorded: RecordedMotion, joints: Any) -> dict[str, Any]:
+def _between(capability: Capability, recorded: RecordedMotion, joints: Sequence[str],
+             ) -> MotionBetween:
     """
     Return how much faster the motion could be with that between its setpoints.
 
@@ -144,7 +145,6 @@ def _between(capability: Capability, recorded: RecordedMotion, joints: Any) -> d
     """
     times = recorded.seconds
     rows = (recorded.wrench,) if recorded.base is None else (recorded.wrench, recorded.base.rows)
-    reason = None
     if len(times) > _MOST_BETWEEN:
         reason = f'they are more than {_MOST_BETWEEN}'
     elif len(times) < 2 or not (np.diff(times) > 0.0).all():
@@ -155,15 +155,15 @@ def _between(capability: Capability, recorded: RecordedMotion, joints: Any) -> d
         base = None if recorded.base is None else BaseMotion.of_rows(recorded.base.rows[0])
         try:
             found = capability.speed_factor(recorded.motion, recorded.wrench[0], base, times)
+            return replace(_fastest(found, recorded, joints), at_s=found.time)
         except (MotionError, ParameterError) as exc:
             reason = str(exc)
-        else:
-            return _named('factor', found, recorded, joints) | {
-                'at_s': found.time, 'reason': None}
-    return {'factor': None, 'limit': None, 'leg': None, 'at_s': None, 'reason': reason}
+    return MotionBetween(None, None, None, None, reason)
 
 
-def _named(name: str, extent: Any, recorded: RecordedMotion, joints: Any) -> dict[str, Any]:
-    plain = answer(extent.value, extent.limit, extent.leg, joints)
-    return {name: plain['value'], 'limit': plain['limit'], 'leg': plain['leg'],
-            'at_s': None if extent.sample is None else recorded.seconds[extent.sample]}
+def _fastest(extent: Extent, recorded: RecordedMotion, joints: Sequence[str]) -> MotionBetween:
+    """Return how much faster a motion could be at its setpoints."""
+    found = rate_extent(*extent[:3], joints=joints)
+    return MotionBetween(
+        found.limit, found.leg, found.value,
+        None if extent.sample is None else float(recorded.seconds[extent.sample]))

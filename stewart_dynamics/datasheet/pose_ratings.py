@@ -9,14 +9,20 @@ from collections.abc import Sequence
 import math
 from typing import Any
 
+from msgspec import UNSET, UnsetType
+from msgspec.structs import asdict
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.capability import Capability, Extent
 from stewart_dynamics.capability.force_intervals import largest_multiple
+from stewart_dynamics.datasheet.datasheet_record import (
+    Directions, Drives, Force, HeldForce, HeldMoment, HeldPayload, Moment, OfAxes, RatedPayload,
+    Rating, Ratings, RemainingMotion, Stiffness, StuckLeg, Worst, WorstLever)
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.records import of_kind
 
 
 # Azimuths of a center of mass beside the pivot, of which the worst counts.
@@ -85,118 +91,104 @@ class Payloads:
 
 
 AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
-KEYS = tuple(f'{axis}{sign}' for axis in AXES for sign in '+-')
+KEYS, _ALL = Directions.keys(), Directions.__struct_fields__
 DIRECTIONS = np.repeat(np.eye(6), 2, axis=0) * np.tile([1.0, -1.0], 6)[:, None]
 """(12, 6): translation and rotation of KEYS, base axes."""
 
 
-def answer(value: Any, limit: Any, leg: Any, joints: Sequence[str]) -> dict[str, Any]:
-    """Return an extent for JSON: null where nothing limits, legs by their names."""
+def rate_extent(value: Any, limit: Any, leg: Any, joints: Sequence[str]) -> Rating:
+    """Return the rating of an extent: null where nothing limits, legs by their names."""
     limited = math.isfinite(value)
-    return {'value': value if limited else None, 'limit': limit if limited else None,
-            'leg': joints[leg] if limited and leg >= 0 else None}
+    return Rating(limit if limited else None, joints[leg] if limited and leg >= 0 else None,
+                  value if limited else None)
 
 
-def answers(found: Extent, joints: Sequence[str], keys: Sequence[str] = KEYS) -> dict[str, Any]:
-    """Return the extents (N,) of some directions for JSON."""
-    return {key: answer(value, limit, leg, joints) for key, value, limit, leg in zip(
-        keys, found.value, found.limit, found.leg, strict=True)}
-
-
-def travel(hexapod: RatedHexapod) -> dict[str, Any]:
+def travel(hexapod: RatedHexapod) -> Directions:
     """Return the travel along and about each axis alone, both ways [m, rad]."""
-    return answers(hexapod.travel(hexapod.pose, DIRECTIONS), hexapod.joints)
+    found = hexapod.travel(hexapod.pose, DIRECTIONS)
+    return Directions(**_named(found, hexapod.joints, _ALL))
 
 
-def at_pose(hexapod: RatedHexapod) -> dict[str, Any]:
-    """Return velocity, acceleration, force, moment and payload at the pose."""
-    return _loads(hexapod, hexapod.pose)
-
-
-def stuck_leg(hexapod: RatedHexapod, leg: int) -> dict[str, Any]:
+def stuck_leg(hexapod: RatedHexapod, leg: int) -> StuckLeg:
     """Return the motions that remain at the pose with a stuck leg, their speeds and loads."""
     found, joints = hexapod.loads.stuck_leg(hexapod.pose, leg), hexapod.joints
-    rows: list[dict[str, Any]] = []
-    for n in range(len(found.motions)):
-        rows.append({'motion': found.motions[n].tolist(), 'wrench': found.wrenches[n].tolist(),
-                     'velocity': _one(found.velocity, n, joints)})
-        rows[n] |= {f'load{sign}': _one(found.load, (n, side), joints)
-                    for side, sign in enumerate('+-')}
-    return {'leg': joints[leg], 'lost': found.lost.tolist(), 'motions': rows,
-            'payload': _one(found.payload, (), joints)}
+    return StuckLeg(
+        joints[leg], found.lost.tolist(), [
+            RemainingMotion(
+                found.motions[n].tolist(), found.wrenches[n].tolist(),
+                _one(found.velocity, n, joints),
+                *(_one(found.load, (n, side), joints) for side in range(2)))
+            for n in range(len(found.motions))],
+        _one(found.payload, (), joints))
 
 
-def _one(extent: Extent | None, at: Any, joints: Sequence[str]) -> dict[str, Any] | None:
-    """Return one of several extents for JSON."""
+def _one(extent: Extent | None, at: Any, joints: Sequence[str]) -> Rating | None:
+    """Return one of several extents."""
     if extent is None:
         return None
     value, limit, leg = (np.asarray(each)[at] for each in extent[:3])
-    return answer(float(value), str(limit), int(leg), joints)
+    return rate_extent(float(value), str(limit), int(leg), joints)
 
 
-def _loads(hexapod: RatedHexapod, poses: Pose) -> dict[str, Any]:
-    """Return the smallest of each rating over poses (N,), or at one."""
-    c, joints = hexapod.loads, hexapod.joints
-    one = not poses.shape
-    all_poses = poses[None] if one else poses
-    at = all_poses[:, None]
-    found: dict[str, Any] = {}
+def rate_poses(hexapod: RatedHexapod, poses: Pose) -> Ratings:
+    """Return the smallest of each rating over poses (N,)."""
+    c, joints, found = hexapod.loads, hexapod.joints, Ratings()
+    at = poses[:, None]
     if c.limits_rates:
-        found['velocity'] = _smallest(c.velocity(at, DIRECTIONS), joints, KEYS)
+        found.velocity = Directions(**_smallest(c.velocity(at, DIRECTIONS), joints, _ALL))
     if c.limits_forces:
-        found['acceleration'] = _smallest(c.acceleration(at, DIRECTIONS), joints, KEYS)
-        found |= _held(hexapod, all_poses, False)
-        if c.limits_held:
-            for name, each in _held(hexapod, all_poses, True).items():
-                found[name]['continuous'] = each
+        found.acceleration = Directions(
+            **_smallest(c.acceleration(at, DIRECTIONS), joints, _ALL))
+        force, moment, payload = _held(hexapod, poses, False)
+        held = _held(hexapod, poses, True) if c.limits_held else 3 * (UNSET,)
+        found.force = Force(**asdict(force), continuous=held[0])
+        found.moment = Moment(**asdict(moment), continuous=held[1])
+        found.payload = RatedPayload(**asdict(payload), continuous=held[2])
     return found
 
 
-def _held(hexapod: RatedHexapod, poses: Pose, continuous: bool) -> dict[str, Any]:
+def _held(hexapod: RatedHexapod, poses: Pose, continuous: bool,
+          ) -> tuple[HeldForce, HeldMoment, HeldPayload]:
     """Return the smallest force, moment and payload at rest over poses (N,)."""
     c, joints, at = hexapod.loads, hexapod.joints, poses[:, None]
-    found = {name: _smallest(c.wrench(at, DIRECTIONS[part], continuous=continuous), joints,
-                             KEYS[part])
-             for name, part in (('force', slice(0, 6)), ('moment', slice(6, 12)))}
-    found['force']['every_direction'] = _least(c.force(poses, continuous=continuous))
-    found['moment']['every_direction'] = _least(c.moment(poses, continuous=continuous))
-    payload = c.payload(poses, np.zeros(3), continuous=continuous)
-    column = Extent(*(each[:, None] for each in payload[:3]))
-    found['payload'] = _smallest(column, joints, ['mass'])['mass']
-    found['payload']['any_orientation'] = (
-        Payloads(c, poses, continuous).any_orientation()
-        if hexapod.given['gravity'].any() else None)
-    return found
+    force, moment = (_smallest(c.wrench(at, DIRECTIONS[part], continuous=continuous), joints,
+                               _ALL[part]) for part in (slice(0, 6), slice(6, 12)))
+    found = c.payload(poses, np.zeros(3), continuous=continuous)
+    payload, = _smallest(
+        Extent(*(each[:, None] for each in found[:3])), joints, ('mass',)).values()
+    return (
+        HeldForce(**force, every_direction=_least(c.force(poses, continuous=continuous))),
+        HeldMoment(**moment, every_direction=_least(c.moment(poses, continuous=continuous))),
+        HeldPayload(**asdict(payload), any_orientation=Payloads(
+            c, poses, continuous).any_orientation() if hexapod.given['gravity'].any() else None))
 
 
-def drives(hexapod: RatedHexapod, ranges: Array | None, levels: int) -> dict[str, Any] | None:
+def drives(hexapod: RatedHexapod, ranges: Array | None, levels: int) -> Drives | UnsetType:
     """
-    Return positions, levers and efforts of the drives at rest at the pose; None without levers.
+    Return positions, levers and efforts of the drives at rest at the pose; unset without levers.
 
     Levers are by their largest values. The worst lever is the smallest over a grid of a box of
     ranges (6, 2).
     """
     p = hexapod.given
-    kind = p.leg_kind
+    kind, worst = p.leg_kind, None
     if not kind.lever_limit:
-        return None
+        return UNSET
     rows = hexapod.platform.inverse_dynamics(Motion.from_pose(hexapod.pose)).rows
-    found: dict[str, Any] = {
-        kind.position.field: rows[kind.position.columns], kind.effort.field: rows[
-            kind.effort.columns], 'lever_ratios': kind.lever_ratios(p, rows), 'worst_lever': None}
     if ranges is not None:
         poses = poses_of(hexapod, grid(ranges, levels))
         ratios = kind.lever_ratios(p, hexapod.platform.inverse_dynamics(
             Motion.from_pose(poses)).rows)
-        leg = int(ratios.min(axis=0).argmin())
-        found['worst_lever'] = {'value': float(ratios.min()), 'leg': hexapod.joints[leg]}
-    return found
+        worst = WorstLever(float(ratios.min()), hexapod.joints[int(ratios.min(axis=0).argmin())])
+    return of_kind(Drives, kind)(
+        positions=rows[kind.position.columns].tolist(), efforts=rows[kind.effort.columns].tolist(),
+        lever_ratios=kind.lever_ratios(p, rows).tolist(), worst_lever=worst)
 
 
-def worst(hexapod: RatedHexapod, ranges: Array, levels: int) -> dict[str, Any]:
+def worst(hexapod: RatedHexapod, ranges: Array, levels: int) -> Worst:
     """Return the smallest of each rating over a grid of a box of ranges (6, 2)."""
     poses = poses_of(hexapod, grid(ranges, levels))
-    return _loads(hexapod, poses) | {'poses': len(poses)}
+    return Worst(poses=len(poses), **asdict(rate_poses(hexapod, poses)))
 
 
 def grid(ranges: Array, levels: int) -> Array:
@@ -216,14 +208,20 @@ def _least(values: Any) -> float:
     return float(np.min(values))
 
 
-def _smallest(found: Extent, joints: Sequence[str], keys: Sequence[str]) -> dict[str, Any]:
-    """Return the smallest of extents (N, K) by key."""
-    at = np.argmin(found.value, axis=0), np.arange(len(keys))
-    return answers(Extent(found.value[at], found.limit[at], found.leg[at]), joints, keys)
+def _smallest(found: Extent, joints: Sequence[str], names: Sequence[str]) -> dict[str, Rating]:
+    """Return the smallest of extents (N, K) by name."""
+    at = np.argmin(found.value, axis=0), np.arange(len(names))
+    return _named(Extent(*(each[at] for each in found[:3])), joints, names)
+
+
+def _named(found: Extent, joints: Sequence[str], names: Sequence[str]) -> dict[str, Rating]:
+    """Return the ratings of extents (K,) by name."""
+    return {name: rate_extent(value, limit, leg, joints) for name, value, limit, leg in zip(
+        names, found.value, found.limit, found.leg, strict=True)}
 
 
 def stiffness(hexapod: RatedHexapod, leg_stiffness: float, ranges: Array | None, levels: int,
-              ) -> dict[str, Any]:
+              ) -> Stiffness:
     """
     Return stiffness by axis [N/m, N m/rad] and natural frequencies [Hz], and their worst.
 
@@ -235,12 +233,11 @@ def stiffness(hexapod: RatedHexapod, leg_stiffness: float, ranges: Array | None,
         compliance = np.diagonal(np.linalg.inv(k), axis1=-2, axis2=-1)
         return 1.0 / compliance, hexapod.frequencies(poses, leg_stiffness)
 
-    axes, frequencies = of(hexapod.pose)
-    found: dict[str, Any] = {
-        'leg_stiffness': leg_stiffness, **dict(zip(AXES, axes.tolist(), strict=True)),
-        'frequencies': frequencies.tolist(), 'worst': None}
+    (axes, frequencies), worst = of(hexapod.pose), None
     if ranges is not None:
-        axes, frequencies = of(poses_of(hexapod, grid(ranges, levels)))
-        found['worst'] = dict(zip(AXES, axes.min(axis=0).tolist(), strict=True)) | {
-            'frequencies': frequencies.min(axis=0).tolist()}
-    return found
+        least, lowest = (each.min(axis=0).tolist() for each in of(
+            poses_of(hexapod, grid(ranges, levels))))
+        worst = OfAxes(**dict(zip(AXES, least, strict=True)), frequencies=lowest)
+    return Stiffness(
+        **dict(zip(AXES, axes.tolist(), strict=True)), frequencies=frequencies.tolist(),
+        leg_stiffness=leg_stiffness, worst=worst)

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import math
-from typing import Any
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.motions import Deviations, faster
+from stewart_dynamics.datasheet.datasheet_record import PossibleChange
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics.home_pose import home_of
@@ -34,13 +34,11 @@ Check = Callable[[RecordedMotion], bool]
 
 
 def possible_changes(platform: StewartPlatform, recorded: RecordedMotion, check: Check,
-                     ) -> list[dict[str, Any]]:
+                     ) -> list[PossibleChange]:
     """
     Return changes of one number each with which a motion is possible, by the check itself.
 
     check: returns whether a motion is possible.
-
-    Each has ``change``, ``value`` (a factor, or a distance [m]) and ``words``.
     """
     few = _thinned(recorded)
     found = []
@@ -49,18 +47,18 @@ def possible_changes(platform: StewartPlatform, recorded: RecordedMotion, check:
             continue
         percent = _largest_percent(scaled, recorded, few, check)
         if percent:
-            found.append({'change': change, 'value': percent / 100.0,
-                          'words': f'at {percent} % of its {change}'})
+            found.append(PossibleChange(
+                change, percent / 100.0, f'at {percent} % of its {change}'))
     height = _nearest_height(platform, recorded, few, check)
     if height is not None:
-        found.append({'change': HEIGHT, 'value': height,
-                      'words': f'from {_length(abs(height))} {_direction(platform, height)}'})
+        found.append(PossibleChange(
+            HEIGHT, height, f'from {_length(abs(height))} {_direction(platform, height)}'))
     return found
 
 
-def in_words(changes: list[dict[str, Any]]) -> str:
+def in_words(changes: list[PossibleChange]) -> str:
     """Return the changes in words; empty without one."""
-    *first, last = [each['words'] for each in changes] or ['']
+    *first, last = [each.words for each in changes] or ['']
     return last and f'possible {", ".join(first)}{", or " if first else ""}{last}'
 
 

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.workspace import Section
+from stewart_dynamics.datasheet.datasheet_record import FrequencySection
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
 from stewart_dynamics.mechanics.frames.motion import Pose
 
@@ -78,11 +79,12 @@ class Frequencies(NamedTuple):
     second: Array  # the same along the second axis (M,) [m]
     values: Array  # (N, M) [Hz]; nan outside the section, 0 where the pose is not stable
 
-    def listed(self) -> dict[str, Any]:
+    def listed(self) -> FrequencySection:
         """Return the numbers for ``datasheet.json``; None outside the section."""
-        return {'first': self.first.tolist(), 'second': self.second.tolist(),
-                'frequencies': [[None if math.isnan(each) else each for each in row]
-                                for row in self.values.tolist()]}
+        return FrequencySection(
+            self.first.tolist(), self.second.tolist(),
+            [[None if math.isnan(each) else each for each in row]
+             for row in self.values.tolist()])
 
 
 def frequencies(hexapod: RatedHexapod, section: Section, axes: tuple[int, int],

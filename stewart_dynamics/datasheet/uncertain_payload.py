@@ -10,10 +10,9 @@ it ends at limits of poses, and ``uncertainty.*`` has no geometry.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from stewart_dynamics.datasheet.datasheet_record import Band, UncertainPayload
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
 from stewart_dynamics.errors import PoseError
 from stewart_dynamics.gpu.uncertain_structures import uncertain_parameters
@@ -23,7 +22,7 @@ BAND = 2.5, 50.0, 97.5
 """Percentiles of the band and of its middle: 95 % of the hexapods are within."""
 
 
-def uncertain_payload(hexapod: RatedHexapod, count: int) -> dict[str, Any]:
+def uncertain_payload(hexapod: RatedHexapod, count: int) -> UncertainPayload:
     """Return the band of the payload at rest [kg], and how many carry none."""
     payloads = np.full(count, np.nan)
     if hexapod.loads.limits_forces:
@@ -34,7 +33,6 @@ def uncertain_payload(hexapod: RatedHexapod, count: int) -> dict[str, Any]:
             except PoseError:  # it does not hold itself: the file's own hexapod is within limits
                 payloads[n] = 0.0
     known = np.isfinite(payloads)
-    low, middle, high = np.percentile(payloads, BAND) if known.all() else [np.nan] * 3
-    return {'hexapods': count,
-            'payload': {'low': finite(low), 'median': finite(middle), 'high': finite(high)},
-            'overloaded': int((payloads[known] <= 0.0).sum())}
+    band = np.percentile(payloads, BAND) if known.all() else [np.nan] * 3
+    return UncertainPayload(
+        count, Band(*map(finite, band)), int((payloads[known] <= 0.0).sum()))
