@@ -34,8 +34,7 @@ class Options(Record):
     hold_out: Annotated[float, means('part of the poses that validates a fit to the others')]
     millimeters: Annotated[dict[str, bool], means('numbers that were read as mm')]
     degrees: Annotated[bool, means('angles were read as degrees')]
-    drive_positions: Annotated[bool, means(
-        'positions are those of drives whose screws turn with their legs')]
+    drive_positions: Annotated[bool, means('positions are those of turning screws')]
     accept_mistakes: Annotated[bool, means('results are written although an error is likely')]
 
 
@@ -107,8 +106,7 @@ class CalibrationResult(EstimationResult, kw_only=True):
     version: Annotated[int, means('of these keys: 1')] = VERSION
     poses: MeasuredPoses
     options: Options
-    not_identified: Annotated[str | None, means(
-        'which numbers cannot be distinguished, and why; null: all are identified')]
+    not_identified: Annotated[str | None, means('numbers that cannot be distinguished, and why')]
     noise: Annotated[NoiseOfPoses | None, means('null: as many residuals as unknowns')]
     frames: Annotated[FramesOfDevice | None, means('null: the frames are known')]
     residuals: ResidualsOfLegs

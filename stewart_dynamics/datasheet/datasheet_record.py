@@ -24,9 +24,7 @@ Stiff = Annotated[float, means('load along the axis per deflection along it')]
 class Limited(Record):
     """A limit that ends something."""
 
-    limit: Annotated[str | None, means(
-        'the limit that ends it, without `limits.` or `drive.`, or `singularity`; null: not '
-        'limited')]
+    limit: Annotated[str | None, means('its name after `limits.` or `drive.`, or `singularity`')]
     leg: Annotated[str | None, means('the leg that reaches the limit; null: not a single leg')]
 
 
@@ -69,14 +67,13 @@ class Directions(Translations):
 class HeldForce(Translations):
     """Forces on the surroundings at rest."""
 
-    every_direction: Annotated[float, means('force that is possible in every direction [N]')]
+    every_direction: Annotated[float, means('smallest of all directions [N]')]
 
 
 class Force(HeldForce):
     """Forces, also those that are held without end."""
 
-    continuous: Annotated[HeldForce | UnsetType, means(
-        'those that are held without end, with `drive.torque_continuous`')] = UNSET
+    continuous: Annotated[HeldForce | UnsetType, means('held without end')] = UNSET
 
 
 class HeldMoment(AlongAxes):
@@ -88,26 +85,25 @@ class HeldMoment(AlongAxes):
     ry_minus: Rating = field(name='ry-')
     rz_plus: Rating = field(name='rz+')
     rz_minus: Rating = field(name='rz-')
-    every_direction: Annotated[float, means('moment that is possible in every direction [N m]')]
+    every_direction: Annotated[float, means('smallest of all directions [N m]')]
 
 
 class Moment(HeldMoment):
     """Moments, also those that are held without end."""
 
-    continuous: Annotated[HeldMoment | UnsetType, means('likewise')] = UNSET
+    continuous: Annotated[HeldMoment | UnsetType, means('held without end')] = UNSET
 
 
 class HeldPayload(Rating):
     """Largest point mass at the pivot, at rest [kg]."""
 
-    any_orientation: Annotated[Number, means(
-        'the same in any orientation of the base [kg]; null without gravity')]
+    any_orientation: Annotated[Number, means('in any orientation of the base [kg]')]
 
 
 class RatedPayload(HeldPayload):
     """Payloads, also those that are held without end."""
 
-    continuous: Annotated[HeldPayload | UnsetType, means('likewise')] = UNSET
+    continuous: Annotated[HeldPayload | UnsetType, means('held without end')] = UNSET
 
 
 class Ratings(Record, kw_only=True):
@@ -161,9 +157,7 @@ class Claim(Limited):
     """A box or a motion that may be possible."""
 
     possible: Annotated[bool, means('whether all of it is possible')]
-    factor: Annotated[Number, means(
-        'by which a box can be scaled, or a motion be faster (below 1: it must be slower); null: '
-        'not known, or not limited')]
+    factor: Annotated[Number, means('how much larger a box, or faster a motion can be')]
 
     @property
     def holds(self) -> bool:
@@ -175,9 +169,7 @@ class Box(Claim):
     """A claimed set of ranges, with its worst pose."""
 
     ranges: Annotated[dict[str, list[Number]], means('as given [m, rad]')]
-    excess: Annotated[Number, means(
-        'by how much the limit is exceeded at the worst pose [m or rad]; null: across a '
-        'singularity')]
+    excess: Annotated[Number, means('of the limit at the worst pose; null: across a singularity')]
     displacement: Annotated[dict[str, float], means('of that pose from the rated one [m, rad]')]
     position: Annotated[Vector, means('of that pose [m]')]
     angles: Annotated[Vector, means('of that pose [rad]')]
@@ -209,13 +201,10 @@ class JudgedMotion(Claim, kw_only=True):
     largest_use: Annotated[dict[str, Number], means('of each kind of limit; 1: it is reached')]
     largest_use_limit: Annotated[str, means('the kind of limit that is used most')]
     largest_use_at_s: Annotated[float, means('when')]
-    between_setpoints: Annotated[MotionBetween | None, means(
-        'null: the motion is possible at no speed, or nothing limits its speed')]
-    amplitude: Annotated[Rating | None, means(
-        'by which the motion can be larger about its first pose; null: through a singularity')]
+    between_setpoints: Annotated[MotionBetween | None, means('with the motion between them')]
+    amplitude: Annotated[Rating | None, means('how much larger about its first pose')]
     payload: Annotated[Rating | None, means('payload that can be added at the pivot [kg]')]
-    possible_with: Annotated[list[PossibleChange], means(
-        'with which changes it is possible, one at a time')]
+    possible_with: Annotated[list[PossibleChange], means('changes that make it possible')]
     rejected: Annotated[int, means('messages that could not be used')]
     missing: Annotated[list[str], means('what could not be read')]
     mistakes: Annotated[list[str], means('possible errors in the messages: it is not judged')]
@@ -268,8 +257,7 @@ class Stiffness(OfAxes, kw_only=True):
 
     leg_stiffness: Annotated[float, means('as given [N/m, N m/rad]')]
     worst: Annotated[OfAxes | None, means('the smallest over a grid of the ranges at once')]
-    sections: Annotated[dict[str, FrequencySection] | UnsetType, means(
-        'the lowest natural frequency over sections through the pose')] = UNSET
+    sections: Annotated[dict[str, FrequencySection] | UnsetType, means('of the pose')] = UNSET
 
 
 class RemainingMotion(Record):
@@ -278,10 +266,8 @@ class RemainingMotion(Record):
     motion: Annotated[Vector, means('its direction [m/s, rad/s]')]
     wrench: Annotated[Vector, means('the wrench of length 1 along it [N, N m]')]
     velocity: Annotated[Rating | None, means('how fast, times the motion')]
-    load_plus: Annotated[Rating | None, means('load along it, times the wrench')] = field(
-        name='load+')
-    load_minus: Annotated[Rating | None, means('load against it, likewise')] = field(
-        name='load-')
+    load_plus: Annotated[Rating | None, means('times the wrench')] = field(name='load+')
+    load_minus: Annotated[Rating | None, means('against the wrench')] = field(name='load-')
 
 
 class StuckLeg(Record):
@@ -319,28 +305,23 @@ class Datasheet(Record, kw_only=True):
     """The content of datasheet.json."""
 
     version: Annotated[int, means('of these keys: 2')] = VERSION
-    software: Annotated[str, means('name and version of the program that wrote the file')] = (
-        SOFTWARE)
+    software: Annotated[str, means('name and version of the program')] = SOFTWARE
     date: Annotated[str, means('when, UTC')]
     name: Annotated[str, means('name of the hexapod')]
     pose: RatedPose
     pivot: Annotated[Vector, means('pivot, platform frame [m]')]
     added_payload: Annotated[AddedPayload | None, means('the payload of the option')]
-    leg_clearance: Annotated[Number, means(
-        'smallest distance between legs at the pose [m]; null: no solids are given')]
+    leg_clearance: Annotated[Number, means('smallest distance between legs at the pose [m]')]
     travel: Annotated[Directions, means('of each axis alone [m, rad]')]
-    at_once: Annotated[AtOnce | None, means(
-        'ranges that are reachable at once, proven; null: travel is not limited')]
+    at_once: Annotated[AtOnce | None, means('ranges that are reachable at once, proven')]
     box: Annotated[Box | None, means('the claimed set of ranges, with `--box`')]
-    velocity: Annotated[Directions | None, means(
-        'of each axis alone, at the pose [m/s, rad/s]; null: no limit')]
+    velocity: Annotated[Directions | None, means('of each axis alone, at the pose [m/s, rad/s]')]
     acceleration: Annotated[Directions | None, means('likewise, from rest [m/s^2, rad/s^2]')]
     force: Annotated[Force | None, means('on the surroundings, at rest [N]')]
     moment: Annotated[Moment | None, means('on the surroundings, at rest [N m]')]
     payload: Annotated[RatedPayload | None, means('point mass at the pivot, at rest [kg]')]
     uncertainty: Annotated[UncertainPayload | None, means('with `--uncertainty`')]
-    worst: Annotated[Worst | None, means(
-        'the smallest of these over a grid of the ranges at once')]
+    worst: Annotated[Worst | None, means('the smallest over a grid of the ranges at once')]
     stiffness: Annotated[Stiffness | None, means('with `--leg-stiffness`')]
     stuck_leg: Annotated[StuckLeg | None, means('with `--stuck`')]
     drives: Annotated[Drives | UnsetType, means('of cranks')] = UNSET

@@ -9,6 +9,7 @@ from typing import Annotated
 
 from msgspec import field, UNSET, UnsetType
 from stewart_dynamics.records import means, Number, Record, Value
+from stewart_dynamics.replay.statements import plural
 from stewart_dynamics.reporting.estimates import Estimate, EstimationResult
 
 VERSION = 1  # of identification.json; increased when the meaning of a key changes
@@ -39,6 +40,17 @@ class BagRead(Record, kw_only=True):
     legs: Annotated[str, means('topic of the measured legs')] = ''
     efforts: Annotated[str, means('topic of the efforts')] = ''
 
+    @property
+    def left_out(self) -> list[str]:
+        """Return in words which samples and messages were not used."""
+        limit = f'at an end stop or {self.kind.effort.name} limit left out'
+        return [f'{plural(number, what)} {why}' for number, what, why in (
+            (self.samples_outliers, 'wild value', 'replaced'),
+            (self.samples_at_stops, 'sample', limit),
+            (self.pieces_left_out, 'piece', 'between gaps too short for the filters'),
+            *((number, 'message', f'rejected: {why}') for why, number in self.rejected.items()),
+            ) if number]
+
 
 class Options(Record):
     """The options as given."""
@@ -58,7 +70,7 @@ class LegResiduals(Record):
     before_rms: Annotated[float, means('of the residual by the file')] = field(
         name='before_rms_{effort_unit}')
     after_rms: Annotated[float, means(
-        'of the residual by `identified.yaml`, on held-out time by a fit to the rest')] = field(
+        'of that by `identified.yaml`, of `validation` by a fit to the rest')] = field(
         name='after_rms_{effort_unit}')
     measured_rms: Annotated[float, means('of the efforts')] = field(
         name='measured_rms_{effort_unit}')
@@ -68,8 +80,7 @@ class ResidualsOfLegs(LegResiduals):
     """The same of all legs together, and of each."""
 
     legs: dict[str, LegResiduals]
-    samples: Annotated[int | UnsetType, means(
-        'of `validation`: number of filtered samples')] = UNSET
+    samples: Annotated[int | UnsetType, means('of `validation`: filtered samples')] = UNSET
 
 
 class IdentificationResult(EstimationResult, kw_only=True):
@@ -83,13 +94,11 @@ class IdentificationResult(EstimationResult, kw_only=True):
     efforts_outliers: Annotated[int, means(
         'efforts left out in stretches in which the platform does not follow the model')]
     base_parameters: Annotated[list[Estimate] | UnsetType, means(
-        'of cranks: the sums of masses that torques show, with the keys of `parameters`; those '
-        'that the file knows exactly are left out')] = UNSET
+        'of cranks: sums of masses that torques show and that the file does not know exactly')
+        ] = UNSET
     residuals: ResidualsOfLegs
-    validation: Annotated[ResidualsOfLegs | None, means(
-        'residuals on held-out time; null: too little data')]
-    tested_for_lack_of_fit: Annotated[bool, means(
-        'false: what can be used of the motion is too short')]
+    validation: Annotated[ResidualsOfLegs | None, means('on held-out time; null: too little data')]
+    tested_for_lack_of_fit: Annotated[bool, means('false: the usable motion is too short')]
     identified: Annotated[dict[str, Value], means('all parameters of `identified.yaml`')]
 
     @property

@@ -275,7 +275,7 @@ def _percent(part: float, whole: float) -> str:
 
 
 def _bags(result: IdentificationResult) -> list[str]:
-    lines, effort = [''], result.kind.effort.name
+    lines = ['']
     for bag in result.bags:
         delay = '' if bag.delay_s is None or bag.delay_standard_error_s is None else (
             f', efforts {1e3 * abs(bag.delay_s):.2f} +- '
@@ -283,14 +283,7 @@ def _bags(result: IdentificationResult) -> list[str]:
             f'{"earlier" if bag.delay_s < 0.0 else "later"} than positions')
         lines.append(f'{bag.bag}: {plural(bag.samples, "sample")} in '
                      f'{bag.seconds:.1f} s of {bag.legs}{delay}')
-        left = [(bag.samples_outliers, 'wild value', 'replaced'),
-                (bag.samples_at_stops, 'sample',
-                 f'at an end stop or {effort} limit left out'),
-                (bag.pieces_left_out, 'piece', 'between gaps too short for the filters')]
-        lines += [f'  {plural(number, what)} {why}' for number, what, why in left if number]
-        lines += [f'  {plural(number, "message")} rejected: {why}'
-                  for why, number in bag.rejected.items()]
-        lines += [f'  {notice}' for notice in bag.notices]
+        lines += [f'  {each}' for each in (*bag.left_out, *bag.notices)]
     if result.efforts_outliers:
         lines.append(f'{plural(result.efforts_outliers, "filtered effort")} left out as outliers')
     return lines

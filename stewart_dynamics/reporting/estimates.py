@@ -58,24 +58,17 @@ class Estimate(_Uncertain, Record):
     unit: Annotated[str, means('its unit')]
     file: Annotated[float, means('value of the file')]
     value: Annotated[float, means('estimate')]
-    state: Annotated[str, means(
-        '`identified`, `not_identifiable`, of a calibration also `in_combination`, `fixed`')]
+    state: Annotated[str, means('`identified`, `in_combination`, `not_identifiable` or `fixed`')]
     standard_error: Annotated[Number, means('standard error; null: not known')]
-    interval: Annotated[tuple[float, float] | None, means(
-        '95 % interval; null: of a calibration if the number is not identified, or if there is a '
-        'lack of fit; of an identification only if a possible error was accepted, see '
-        '`likely_mistakes`')]
+    interval: Annotated[tuple[float, float] | None, means('95 % interval')]
     unknown_share: Annotated[float, means('0: identifiable by itself')]
-    at_bound: Annotated[bool, means(
-        'no body has the values that fit best: the value is at its bound')]
-    file_deviation: Annotated[float | UnsetType, means(
-        "of an identification: standard deviation of the file's value")] = UNSET
-    written: Annotated[float | UnsetType, means(
-        'of an identification: the value in `identified.yaml`')] = UNSET
+    at_bound: Annotated[bool, means('no body has the values that fit best')]
+    file_deviation: Annotated[float | UnsetType, means('standard error of `file`')] = UNSET
+    written: Annotated[float | UnsetType, means('the value in `identified.yaml`')] = UNSET
     parts: Annotated[dict[str, float] | UnsetType, means(
-        'of an identification: standard deviations by origin, without zeros: `noise`, `friction`, '
-        '`offset`, and the names in `uncertainty.*`; their squares add up to that of the whole, '
-        'without a widening')] = UNSET
+        'standard deviations by origin, without zeros: `noise`, `friction`, `offset`, and the '
+        'names in `uncertainty.*`; their squares add up to that of the whole, without a widening')
+        ] = UNSET
 
     @property
     def change(self) -> float:
@@ -109,13 +102,10 @@ class LikelyError(Record):
 class Cause(LikelyError):
     """A cause of a lack of fit."""
 
-    statistic: Annotated[float | UnsetType, means(
-        'of an identification: test statistic that the cause explains')] = UNSET
-    columns: Annotated[int | UnsetType, means(
-        'of an identification: its degrees of freedom')] = UNSET
+    statistic: Annotated[float | UnsetType, means('test statistic that it explains')] = UNSET
+    columns: Annotated[int | UnsetType, means('degrees of freedom of the statistic')] = UNSET
     deviations: Annotated[float | UnsetType, means(
-        'of an identification: standard deviations of a normal distribution with the same '
-        'probability')] = UNSET
+        'standard deviations of a normal distribution with the same probability')] = UNSET
 
 
 class FoundLackOfFit(Record):
@@ -126,24 +116,21 @@ class FoundLackOfFit(Record):
     intervals: Annotated[str, means('`widened` or `none`')]
     causes: Annotated[list[Cause], means('all significant ones, the likeliest first')]
     residual_left: Annotated[float | UnsetType, means(
-        'of an identification: part of the RMS with the cause; 1: nothing is added to the model')
-        ] = UNSET
+        'part of the residual RMS with the cause; 1: nothing is added to the model')] = UNSET
 
 
 class EstimationResult(Record, kw_only=True):
     """The keys that identification.json and calibration.json have in common."""
 
     version: Annotated[int, means('of these keys: 1')]
-    software: Annotated[str, means('name and version of the program that wrote the file')] = (
-        SOFTWARE)
+    software: Annotated[str, means('name and version of the program')] = SOFTWARE
     date: Annotated[str, means('when, UTC')]
     parameters: list[Estimate]
     combinations: Annotated[list[Combination], means('identifiable sums of parameters')]
     rank: Annotated[int, means('number of directions of the unknowns that are identifiable')]
     unknowns: Annotated[int, means('number of unknowns')]
     singular_values: Annotated[list[float], means('of the information in the data')]
-    lack_of_fit: Annotated[FoundLackOfFit | None, means(
-        'null: the residuals are noise, or not tested')]
+    lack_of_fit: Annotated[FoundLackOfFit | None, means('null: none, or not tested')]
     likely_mistakes: Annotated[list[LikelyError], means('possible errors that were accepted')]
 
     @property
