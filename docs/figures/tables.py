@@ -30,6 +30,7 @@ from stewart_dynamics.cueing.cueing_result import CueingResult
 from stewart_dynamics.datasheet.datasheet_record import Datasheet
 from stewart_dynamics.identification.identification_record import IdentificationResult
 from stewart_dynamics.legs import CRANK, KINDS
+from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.node.dynamics_node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.circles import circle_names
@@ -384,9 +385,9 @@ def document_schema(record: type[Record]) -> str:
     return json.dumps({'anyOf': kinds, '$defs': records}, indent=1) + '\n'
 
 
-def document_keys(record: type[Record], *names: str) -> str:
+def document_keys(record: type[Record], *names: str, kind: LegKind = KINDS[0]) -> str:
     """Return the table of keys of a document, with the keys in them; without names of all."""
-    listed = {each.name: each for each in fields(of_kind(record, KINDS[0]))}
+    listed = {each.name: each for each in fields(of_kind(record, kind))}
     places: dict[type[Record], str] = {}
     return '\n'.join(['| key | type | meaning |', '| --- | --- | --- |', *(
         row for name in names or listed for row in _key_rows(name, listed[name].type, places))])
@@ -479,7 +480,8 @@ def pages() -> dict[Path, dict[str, str]]:
             'keys of identification.json': document_keys(IdentificationResult)},
         ROOT / 'docs' / 'calibration.md': {
             'keys of calibration.json': document_keys(CalibrationResult)},
-        ROOT / 'docs' / 'capability.md': {'keys of datasheet.json': document_keys(Datasheet)},
+        ROOT / 'docs' / 'capability.md': {
+            'keys of datasheet.json': document_keys(Datasheet, kind=CRANK)},
         ROOT / 'docs' / 'cranks.md': {
             'parameters of cranks': rows({
                 name: parameter for name, parameter in Parameters.table.items()
