@@ -9,6 +9,8 @@ Stops from governed states, by equations of their own.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from referees import PLATFORM, rotation_about
 
-from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics import GovernedStream, Motion, Parameters, StewartPlatform
+from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 
 Array = NDArray[np.float64]
@@ -194,6 +197,16 @@ def limited_cranks(random: np.random.Generator, kind: str) -> tuple[Parameters, 
     if 'limits.platform_joint_angle_max' in changes:
         changes['geometry.platform_joint_axes'] = axes[1]
     return parameters_of(machine, **changes), axes
+
+
+def governable(random: np.random.Generator, kind: str,
+               limited: Callable[[np.random.Generator, str], tuple[Parameters, Array]],
+               ) -> tuple[Parameters, Array, GovernedStream]:
+    """Return a limited hexapod whose home is within its limits, and its governor."""
+    while True:
+        with suppress(ParameterError):
+            p, axes = limited(random, kind)
+            return p, axes, GovernedStream(p)
 
 
 def size_of(p: Parameters) -> float:

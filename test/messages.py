@@ -6,16 +6,22 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
-from stewart_dynamics import Parameters
+from stewart_dynamics import Motion, Parameters
+from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.messages.setpoint import StampedWriter
+from stewart_dynamics.setpoints.input_messages import INPUT_TYPES
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import Rejection
 from stewart_dynamics.setpoints.step import Batch
@@ -36,6 +42,11 @@ MS, SECOND = 1_000_000, 1_000_000_000  # [ns]
 NOW = RECORDED = 1_700_000_000 * SECOND
 
 Recorded = tuple[str, int, bytes]  # topic, time, message
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+# Types by the last part of a topic's name.
+KINDS = {topic.rpartition('/')[2]: kind for topic, kind in INPUT_TYPES.items()} | dict.fromkeys(
+    ('measured_legs', 'joint_states', 'legs'), JOINT_STATE)
 
 
 class Feed:
@@ -196,6 +207,44 @@ def trajectory(stamp: int, times: Sequence[int], rows: Sequence[Sequence[float]]
                     (transforms, twists, accelerations), many, strict=True)),
             _new('builtin_interfaces/msg/Duration', *divmod(time, 1_000_000_000))))
     return _bytes(_new(COMBINED, _header(stamp, frame), list(names), points), little_endian)
+
+
+def write_bag(folder: Path, of: Iterable[Recorded], node: str = '/stewart_dynamics',
+              plugin: StoragePlugin = StoragePlugin.MCAP,
+              mode: CompressionMode = CompressionMode.NONE, **types: str) -> Path:
+    """Write a rosbag2; topics are made as they come, of types by the ends of their names."""
+    writer = Writer(folder, version=9, storage_plugin=plugin)
+    if mode is not CompressionMode.NONE:
+        writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connections: dict[str, Any] = {}
+        for topic, when, data in of:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(
+                    topic if topic.startswith('/') else f'{node}/{topic}',
+                    (KINDS | types)[topic.rpartition('/')[2]], typestore=STORE)
+            writer.write(connections[topic], when, data)
+    return folder
+
+
+def setpoints(stamps: NDArray[np.int64], motion: Motion) -> Iterable[Recorded]:
+    """Return a motion as setpoints that are recorded at their stamps [ns]."""
+    writers = [(f'setpoint/{name}', StampedWriter('base', size)) for name, size in (
+        ('pose', 7), ('twist', 6), ('accel', 6))]
+    rows = np.hstack([motion.position, motion.quaternion, motion.rows[:, 12:]])
+    for stamp, row in zip(stamps.tolist(), rows.tolist(), strict=True):
+        for (topic, writer), part in zip(writers, (row[:7], row[7:13], row[13:]), strict=True):
+            yield topic, stamp, writer.write(stamp, part)
+
+
+def leg_states(stamps: NDArray[np.int64], joints: Sequence[str], positions: Any, rates: Any,
+               efforts: Any, topic: str = 'measured_legs') -> Iterable[Recorded]:
+    """Return measured legs, recorded at their stamps [ns]; without rates they are zero."""
+    writer = JointStateWriter(joints)
+    still = np.zeros(np.shape(positions)) if rates is None else rates
+    for n, stamp in enumerate(stamps.tolist()):
+        yield topic, stamp, writer.write(
+            stamp, positions[n], still[n], None if efforts is None else efforts[n])
 
 
 def motion(number: int) -> list[Recorded]:

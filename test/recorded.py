@@ -11,22 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from independent_hexapod import moving
+import messages
 import numpy as np
 from numpy.typing import NDArray
 from referees import rng, rotation_about
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics import Motion, Parameters
-from stewart_dynamics.messages.joint_state import JointStateWriter
 
 Array = NDArray[np.float64]
 
 TOPIC = '/stewart_dynamics/measured_legs'
-JOINT_STATE = 'sensor_msgs/msg/JointState'
 START = 1_700_000_000_000_000_000
 HOME = np.array([0.0, 0.0, 1.1])
 AMPLITUDES = np.array([0.09, 0.09, 0.06, 0.12, 0.12, 0.15])  # RMS [m, rad]
@@ -157,13 +154,7 @@ def coloured(random: np.random.Generator, many: int, correlation: float) -> Arra
 def write_bag(folder: Path, given: Recorded, joints: Sequence[str], topic: str = TOPIC,
               start: int = START) -> Path:
     """Write a bag with the recording, in MCAP."""
-    writer = JointStateWriter(joints)
-    store = get_typestore(Stores.ROS2_JAZZY)
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        to = bag.add_connection(topic, JOINT_STATE, typestore=store)
-        stamps = start + np.round(given.times * 1e9).astype(np.int64)
-        rates: Any = given.rates if given.rates is not None else np.zeros((len(stamps), 6))
-        for n, stamp in enumerate(stamps.tolist()):
-            data = writer.write(stamp, given.positions[n], rates[n], given.efforts[n])
-            bag.write(to, stamp, data)
-    return folder
+    stamps = start + np.round(given.times * 1e9).astype(np.int64)
+    return messages.write_bag(
+        folder, messages.leg_states(stamps, joints, given.positions, given.rates, given.efforts,
+                                    topic), **{topic.rpartition('/')[2]: messages.JOINT_STATE})

@@ -11,8 +11,9 @@ from pathlib import Path
 import re
 import shlex
 
-import messages
+from messages import leg_states, NOW, setpoints, write_bag
 import numpy as np
+from programs import call
 import pytest
 from referees import ROOT
 from stewart_dynamics import Motion, StewartPlatform
@@ -20,11 +21,7 @@ from stewart_dynamics.calibration.calibrate_command_line import main as calibrat
 from stewart_dynamics.datasheet.datasheet_command_line import main as capability
 from stewart_dynamics.identification.identify_command_line import main as identify
 from stewart_dynamics.identification.lack_of_fit import NEXT
-from stewart_dynamics.mechanics.frames.rotation import to_quaternion
-from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.replay.replay_command_line import main as replay
-from stewart_dynamics.setpoints.input_messages import ACCEL, POSE, TWIST
-from test_replay import write_bag
 
 PROGRAMS: dict[str, Callable[[list[str]], int]] = {
     'stewart_calibrate': calibrate, 'stewart_capability': capability,
@@ -38,24 +35,17 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a bag of 12 s with setpoints and measured legs, in a folder with a space."""
     platform = StewartPlatform.from_yaml(FILE)
     p, home = platform.parameters, platform.home_pose()
-    joints, times = JointStateWriter(p.joints), 0.01 * np.arange(1200)
+    times = 0.01 * np.arange(1200)
     sizes, w = np.array([0.06, 0.05, 0.04, 0.05, 0.06, 0.08]), np.array([
         3.1, 3.7, 4.3, 2.9, 3.3, 4.7])
     waves = [sizes * w ** n * np.sin(w * times[:, None] + n * np.pi / 2.0) for n in range(3)]
     waves[0][:, :3] += home.position
     motion = Motion.from_euler(*(part for wave in waves for part in (wave[:, :3], wave[:, 3:])))
     result = platform.inverse_dynamics(motion)
-    recorded = []
-    for n, time in enumerate(times):
-        stamp = messages.NOW + round(1e9 * time)
-        recorded += [
-            (POSE, stamp, messages.pose(stamp, motion.position[n],
-                                        to_quaternion(motion.rotation[n]))),
-            (TWIST, stamp, messages.twist(stamp, motion.rows[n, 12:18])),
-            (ACCEL, stamp, messages.accel(stamp, motion.rows[n, 18:24])),
-            ('measured_legs', stamp, joints.write(
-                stamp, result.lengths[n] - p.geometry.zero_length, result.rates[n],
-                1.02 * result.forces[n] + 20.0 * np.sign(result.rates[n])))]
+    stamps = NOW + np.rint(1e9 * times).astype(np.int64)
+    recorded = [*setpoints(stamps, motion), *leg_states(
+        stamps, p.joints, result.lengths - p.geometry.zero_length, result.rates,
+        1.02 * result.forces + 20.0 * np.sign(result.rates))]
     return write_bag(tmp_path_factory.mktemp('a folder') / 'bag', recorded,
                      measured_legs='sensor_msgs/msg/JointState')
 
@@ -66,11 +56,10 @@ def run(command: str, folder: Path) -> int:
     return PROGRAMS[program]([*arguments, '--output', str(folder)])
 
 
-def test_commands_of_a_replay_run_as_printed(
-        bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert replay([str(bag), '--params', str(FILE), '--measured', LEGS, '--output',
-                   str(tmp_path / 'replayed')]) == 0
-    command, = re.findall('^  (stewart_identify .*)$', capsys.readouterr().out, re.MULTILINE)
+def test_commands_of_a_replay_run_as_printed(bag: Path, tmp_path: Path) -> None:
+    out = call(replay, bag, '--params', FILE, '--measured', LEGS, '--output',
+               tmp_path / 'replayed').out
+    command, = re.findall('^  (stewart_identify .*)$', out, re.MULTILINE)
     assert shlex.split(command)[1] == str(bag)
     assert run(command, tmp_path / 'identified') == 0
     assert (tmp_path / 'identified' / 'identified.yaml').exists()

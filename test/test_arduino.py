@@ -13,6 +13,7 @@ from typing import Any
 import zipfile
 
 import numpy as np
+from programs import call, run_program
 import pytest
 from referees import Array, rng
 from snapshot import Snapshot
@@ -56,9 +57,8 @@ def sketch(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def moved(sketch: Path, *lines: str) -> tuple[Array, list[str]]:
     """Return pulses (N, 6) [us] that the sketch commands, and what it answers."""
-    done = subprocess.run([sketch], input='\n'.join([*lines, '']), capture_output=True, text=True,
-                          check=True)
-    words = [line.split() for line in done.stdout.splitlines()]
+    done = run_program(sketch, text='\n'.join([*lines, '']))
+    words = [line.split() for line in done.out.splitlines()]
     pulses = [[int(each[1]), int(each[2])] for each in words if each[0] == 'pulse']
     rows = np.array(pulses).reshape(-1, 6, 2)
     assert (rows[:, :, 0] == PINS).all()
@@ -125,17 +125,15 @@ def test_a_pose_outside_limits_or_servos_is_not_begun(sketch: Path) -> None:
     np.testing.assert_allclose(rows[-1], pulses_of(np.array([0, 0, 0.02, 0, 0, 0])), atol=0.5001)
 
 
-def test_files_need_the_points_of_the_servos(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+def test_files_need_the_points_of_the_servos(tmp_path: Path, snapshot: Snapshot) -> None:
     for path in CRANK_FILE, PLATFORM_FILE:
         with snapshot.raises(ParameterError):
             arduino_library(Parameters.from_yaml(path), 'rig')
     RIG.to_yaml(tmp_path / 'rig.yaml')
-    assert main(['--params', str(tmp_path / 'rig.yaml'), '--output', str(tmp_path / 'out'),
-                 '--name', 'rig', '--arduino']) == 0
-    assert capsys.readouterr().out.split()[-1] == str(tmp_path / 'out' / 'rig_arduino.zip')
+    out = call(main, '--params', tmp_path / 'rig.yaml', '--output', tmp_path / 'out', '--name',
+               'rig', '--arduino').out
+    assert out.split()[-1] == str(tmp_path / 'out' / 'rig_arduino.zip')
     assert (tmp_path / 'out' / 'rig_arduino.zip').read_bytes() == arduino_library(
         Parameters.from_yaml(tmp_path / 'rig.yaml'), 'rig')
-    assert main(['--params', str(PLATFORM_FILE), '--output', str(tmp_path / 'none'),
-                 '--arduino']) == 2
+    call(main, '--params', PLATFORM_FILE, '--output', tmp_path / 'none', '--arduino', code=2)
     assert not (tmp_path / 'none').exists()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import (
-    each_relative, friction, PinocchioReferee,
+    each_relative, PinocchioReferee,
     random_base_motion, random_direction, random_motion, random_parameters, random_wrench,
     relative, rng, rotation_about, size_of, STANDARD_GRAVITY)
 from snapshot import Snapshot
@@ -33,18 +33,6 @@ def case(seed: int, many: int = STATES) -> Case:
             random_base_motion(p, random, many))
 
 
-def lagrange_forces(platform: StewartPlatform, motion: Motion, wrench: Any, base: BaseMotion,
-                    ) -> Any:
-    """Return the leg forces by M, C and G."""
-    twist, acceleration = motion.rows[:, 12:18, None], motion.rows[:, 18:24, None]
-    load = (platform.mass_matrix(motion) @ acceleration
-            + platform.coriolis_matrix(motion, base=base) @ twist
-            + platform.gravity_vector(motion, base)[..., None] - np.asarray(wrench)[..., None])
-    transposed = np.swapaxes(platform.inverse_jacobian(motion), -1, -2)
-    rates = (platform.inverse_jacobian(motion) @ twist)[..., 0]
-    return np.linalg.solve(transposed, load)[..., 0] + friction(platform.parameters, rates)
-
-
 @pytest.mark.parametrize('seed', range(MACHINES))
 def test_forces_and_base_wrench_are_those_of_pinocchio(seed: int) -> None:
     platform, motion, wrench, base = case(seed)
@@ -54,23 +42,6 @@ def test_forces_and_base_wrench_are_those_of_pinocchio(seed: int) -> None:
     assert each_relative(forces, [each for each, _ in truth]) < 1e-12
     found = platform.base_wrench(motion, wrench, base)
     assert each_relative(found, [each for _, each in truth]) < 1e-12
-
-
-@pytest.mark.parametrize('seed', range(MACHINES))
-def test_forces_are_those_of_the_lagrange_equations(seed: int) -> None:
-    platform, motion, wrench, base = case(seed)
-    truth = lagrange_forces(platform, motion, wrench, base)
-    assert relative(platform.inverse_dynamics(motion, wrench, base).forces, truth) < 1e-13
-
-
-def test_forward_dynamics_of_inverse_dynamics_is_the_motion() -> None:
-    platform, motion, wrench, base = case(1, 50)
-    forces = platform.inverse_dynamics(motion, wrench, base).forces
-    assert relative(platform.forward_dynamics(motion, forces, wrench, base).rows,
-                    motion.rows) < 1e-11
-    one = platform.forward_dynamics(motion[7], forces[7], wrench[7], base[7])
-    assert np.array_equal(one.rows, platform.forward_dynamics(
-        motion, forces, wrench, base).rows[7])
 
 
 def test_a_base_at_rest_gives_the_same_bits() -> None:
@@ -88,21 +59,6 @@ def test_a_base_at_rest_gives_the_same_bits() -> None:
         motion, forces)
 
 
-def test_one_sample_has_the_bits_of_many() -> None:
-    platform, motion, wrench, base = case(3, 2 * LANES + 5)
-    many = platform.inverse_dynamics(motion, wrench, base)
-    wrenches = platform.base_wrench(motion, wrench, base)
-    still = platform.inverse_dynamics(motion)
-    for n in (0, LANES - 1, LANES, 2 * LANES + 4):
-        one = platform.inverse_dynamics(motion[n], wrench[n], base[n])
-        assert np.array_equal(one.rows, many.rows[n])
-        assert np.array_equal(platform.base_wrench(motion[n], wrench[n], base[n]), wrenches[n])
-        assert np.array_equal(platform.inverse_dynamics(motion[n]).rows, still.rows[n])
-    for_all = platform.inverse_dynamics(motion, wrench, base[4])
-    assert np.array_equal(
-        for_all.rows[9], platform.inverse_dynamics(motion[9], wrench[9], base[4]).rows)
-
-
 def test_rows_of_nan_among_others_add_nothing() -> None:
     platform, motion, wrench, base = case(4, 3 * LANES)
     rows = base.rows.copy()
@@ -112,18 +68,6 @@ def test_rows_of_nan_among_others_add_nothing() -> None:
     found = platform.solve(motion.rows, wrench, rows)
     assert np.array_equal(found[still], platform.solve(motion.rows, wrench)[still])
     assert np.array_equal(found[~still], platform.solve(motion.rows, wrench, base.rows)[~still])
-
-
-def test_turning_the_base_is_turning_gravity() -> None:
-    platform, motion, wrench, _ = case(6)
-    turn = rotation_about(random_direction(rng()), 0.7)
-    gravity = platform.parameters['gravity']
-    base = BaseMotion.from_pose(Pose(np.zeros(3), turn), gravity)
-    turned = StewartPlatform(platform.parameters.replaced({'gravity': turn.T @ gravity}))
-    assert relative(platform.inverse_dynamics(motion, wrench, base).forces,
-                    turned.inverse_dynamics(motion, wrench).forces) < 1e-13
-    assert relative(platform.base_wrench(motion, wrench, base),
-                    turned.base_wrench(motion, wrench)) < 1e-13
 
 
 def test_the_sources_sum_to_the_force() -> None:

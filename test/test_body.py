@@ -38,12 +38,6 @@ FILE = Parameters.from_yaml(Path(__file__).parents[1] / 'config' / 'platform.yam
 WITH_DRIVER = FILE.with_payload(DRIVER)
 
 
-def random_body(random: np.random.Generator) -> Body:
-    """Return a body of four point masses, which has all inertias."""
-    masses, points = random.uniform(1.0, 40.0, 4), random.uniform(-0.5, 0.5, (4, 3))
-    return of_points(masses, points)
-
-
 def of_points(masses: Array, points: Array) -> Body:
     """Return the body of point masses (N,) at points (N, 3), by definition."""
     center = masses @ points / masses.sum()

@@ -9,13 +9,14 @@ from collections.abc import Callable, Sequence
 import json
 from pathlib import Path
 
+import messages
+from messages import leg_states, MS, SECOND
 import numpy as np
+from programs import call
 import pytest
 import recorded
 from recorded import Recorded
 from referees import PLATFORM
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_typestore, Stores
 from snapshot import Snapshot
 from stewart_dynamics import (
     check_planned_trajectory, Motion, ParameterError, Parameters, Pose, read_setpoints,
@@ -34,7 +35,6 @@ from stewart_dynamics.calibration.recorded_poses import read_bag
 from stewart_dynamics.calibration.tracked_poses import read_tracked
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.reporting.estimates import estimate, rounded, table_lines
 from stewart_dynamics.tables.reading import Reading
@@ -58,13 +58,10 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_files_and_page(
-        table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
-        snapshot: Snapshot) -> None:
+def test_files_and_page(table: Path, tmp_path: Path, snapshot: Snapshot) -> None:
     output = tmp_path / 'out'
     arguments = [str(table), '--params', str(PLATFORM), '--output', str(output)]
-    assert main([*arguments, '--strict']) == 0
-    shown = capsys.readouterr().out
+    shown = call(main, *arguments, '--strict').out
     assert 'row 5: left out, all legs off by up to 1' in shown
     result = json.loads((output / 'calibration.json').read_text())
     true = true_values(np.random.default_rng(0))
@@ -87,9 +84,8 @@ def test_files_and_page(
     page = (output / 'report.html').read_text()
     assert page.count('<svg') == 3 and 'row 5: left out' in page and 'nan' not in page
     # Results are replaced on request alone.
-    assert main(arguments) == 2
-    snapshot(capsys.readouterr().err)
-    assert main([*arguments, '--force', '--fixed', 'zero_length']) == 0
+    snapshot(call(main, *arguments, code=2).err)
+    call(main, *arguments, '--force', '--fixed', 'zero_length')
     assert (output / 'report.html').read_text().count('<td class="none">fixed</td>') == 6
 
 
@@ -118,7 +114,7 @@ def tracked(path: Path, poses: Pose, home: bool, noise: float = 1e-6) -> Path:
 
 @pytest.mark.parametrize('home', [False, True])
 def test_poses_come_from_the_file_of_a_tracker(
-        home: bool, table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        home: bool, table: Path, tmp_path: Path) -> None:
     given = read_poses(table, HEXAPOD.parameters)
     path = tracked(tmp_path / 'tracker.csv', given.poses, home)
     legs = tmp_path / 'legs.tsv'
@@ -130,20 +126,16 @@ def test_poses_come_from_the_file_of_a_tracker(
     np.testing.assert_allclose(found.positions, given.positions, atol=1e-15)
     output = tmp_path / 'out'
     arguments = [str(legs), '--pose', str(path), '--params', str(PLATFORM)]
-    assert main([*arguments, '--output', str(output)]) == 0
-    assert 'row 5, t = ' in capsys.readouterr().out  # the outlier
+    assert 'row 5, t = ' in call(main, *arguments, '--output', output).out  # the outlier
     result = json.loads((output / 'calibration.json').read_text())
     assert result['poses']['pose'] == str(path)
     assert result['validation']['after']['position_rms_m'] < 3e-5
 
 
-def test_rests_and_rows_must_be_as_many(
-        table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
-        snapshot: Snapshot) -> None:
+def test_rests_and_rows_must_be_as_many(table: Path, tmp_path: Path, snapshot: Snapshot) -> None:
     given = read_poses(table, HEXAPOD.parameters)
     path = tracked(tmp_path / 'tracker.csv', given.poses[:-1], False)
-    assert main([str(table), '--pose', str(path), '--params', str(PLATFORM)]) == 2
-    snapshot(capsys.readouterr().err)
+    snapshot(call(main, table, '--pose', path, '--params', PLATFORM, code=2).err)
 
 
 def test_units_and_angles(table: Path, tmp_path: Path) -> None:
@@ -257,39 +249,30 @@ def edited(change: Callable[[list[str]], list[str]], table: Path, tmp_path: Path
     lambda rows: [*rows[:3], rows[3].rpartition(',')[0] + ',3.0', *rows[4:]]])
 def test_bad_files_are_rejected_in_one_line(
         change: Callable[[list[str]], list[str]], table: Path, tmp_path: Path,
-        capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+        snapshot: Snapshot) -> None:
     path = edited(change, table, tmp_path)
     output = tmp_path / 'out'
-    assert main([str(path), '--params', str(PLATFORM), '--output', str(output)]) == 2
-    error = capsys.readouterr().err
+    error = call(main, path, '--params', PLATFORM, '--output', output, code=2).err
     snapshot(error)
     assert error.count('\n') == 1 and not output.exists()
 
 
-def test_other_bad_input(
-        table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
-        snapshot: Snapshot) -> None:
+def test_other_bad_input(table: Path, tmp_path: Path, snapshot: Snapshot) -> None:
     (tmp_path / 'binary').write_bytes(b'\xff\x00' * 99)
     for path in (tmp_path / 'missing.csv', tmp_path, tmp_path / 'binary', Path('/dev/zero')):
-        assert main([str(path), '--params', str(PLATFORM)]) == 2
-        error = capsys.readouterr().err
+        error = call(main, path, '--params', PLATFORM, code=2).err
         assert 'cannot be read' in error and error.count('\n') == 1
     for option in (['--fixed', ','], ['--noise', '1', '2'], ['--hold-out', '0.9'],
                    ['--frames', 'other'], []):
-        with pytest.raises(SystemExit, match='2'):
-            main([*([str(table)] if option else []), '--params', str(PLATFORM), *option])
-    capsys.readouterr()
-    assert main([str(table), '--params', str(PLATFORM), '--fixed', 'leg_7']) == 2
-    snapshot(capsys.readouterr().err)
-    assert main([str(table), '--params', str(PLATFORM), '--mm']) == 2
-    snapshot(capsys.readouterr().err)
+        call(main, *([str(table)] if option else []), '--params', PLATFORM, *option, code=2)
+    snapshot(call(main, table, '--params', PLATFORM, '--fixed', 'leg_7', code=2).err)
+    snapshot(call(main, table, '--params', PLATFORM, '--mm', code=2).err)
 
 
 @pytest.mark.parametrize('in_mm', [(False, False), (True, False), (False, True), (True, True)])
 @pytest.mark.parametrize('given', [[], ['--mm'], ['--mm-positions'], ['--mm-legs']])
 def test_the_advice_on_units_leads_to_a_result(
-        in_mm: tuple[bool, bool], given: list[str], table: Path, tmp_path: Path,
-        capsys: pytest.CaptureFixture[str]) -> None:
+        in_mm: tuple[bool, bool], given: list[str], table: Path, tmp_path: Path) -> None:
     """A tracker in mm with legs in m, and all others: the named option is the right one."""
     measured = read_poses(table, HEXAPOD.parameters)
     positions, lengths = (1e3 * each if mm else each for each, mm in zip(
@@ -300,14 +283,12 @@ def test_the_advice_on_units_leads_to_a_result(
                  '--no-report']
     right = {(False, False): [], (True, True): ['--mm'], (True, False): ['--mm-positions'],
              (False, True): ['--mm-legs']}[in_mm]
-    code = main([*arguments, *given])
-    error = capsys.readouterr().err
-    assert code == (0 if given == right else 2)
-    if code:
+    error = call(main, *arguments, *given, code=0 if given == right else 2).err
+    if given != right:
         advice = error.split(': ')[-1]
         assert advice.startswith(f'without {given[0]} ' if not right else right[0] + (
             ' in place of ' if given else ' reads them so')), error
-        assert main([*arguments, *right]) == 0
+        call(main, *arguments, *right)
     assert json.loads((tmp_path / 'out' / 'calibration.json').read_text())['options'][
         'millimeters'] == {'positions': in_mm[0], 'legs': in_mm[1]}
 
@@ -320,27 +301,25 @@ def test_a_bag_in_mm_is_read_so(tmp_path: Path) -> None:
         1e3 * seen.position, seen.rotation), '/joint_states')
     arguments = [str(folder), '--params', str(PLATFORM), '--output', str(tmp_path / 'out'),
                  '--no-report']
-    assert main(arguments) == 2
-    assert main([*arguments, '--mm-positions']) == 0
+    call(main, *arguments, code=2)
+    call(main, *arguments, '--mm-positions')
 
 
-def test_positions_of_drives_are_an_option(table: Path, tmp_path: Path,
-                                           capsys: pytest.CaptureFixture[str],
-                                           snapshot: Snapshot) -> None:
+def test_positions_of_drives_are_an_option(
+        table: Path, tmp_path: Path, snapshot: Snapshot) -> None:
     file = tmp_path / 'universal.yaml'
     HEXAPOD.parameters.replaced(UNIVERSAL).to_yaml(file)
     arguments = [str(table), '--drive-positions', '--output', str(tmp_path / 'out')]
-    assert main([*arguments, '--params', str(PLATFORM)]) == 2
-    snapshot(capsys.readouterr().err)
-    assert main([*arguments, '--params', str(file), '--strict']) == 1
-    assert 'LACK OF FIT: positions follow the turns of the legs' in capsys.readouterr().out
+    snapshot(call(main, *arguments, '--params', PLATFORM, code=2).err)
+    out = call(main, *arguments, '--params', file, '--strict', code=1).out
+    assert 'LACK OF FIT: positions follow the turns of the legs' in out
     result = json.loads((tmp_path / 'out' / 'calibration.json').read_text())
     assert result['options']['drive_positions'] and result['lack_of_fit']['cause'] == 'turns'
     assert all(each['interval'] is None for each in result['parameters'])
 
 
 def test_frames_of_a_device_are_on_the_page_and_in_the_files(
-        table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        table: Path, tmp_path: Path) -> None:
     given = read_poses(table, HEXAPOD.parameters)
     camera = Pose([1.5, -0.4, 0.7], from_euler([0.3, -0.2, 1.0]))
     target = Pose([0.05, 0.02, 0.1], from_euler([0.1, 0.2, -0.3]))
@@ -349,14 +328,13 @@ def test_frames_of_a_device_are_on_the_page_and_in_the_files(
     file.write_text(poses_csv(JOINTS, given.positions, Pose(
         given.poses.position @ camera.rotation.T + camera.position + seen @ target.position,
         seen @ target.rotation)))
-    assert main([str(file), '--frames', 'unknown', '--params', str(PLATFORM), '--output',
-                 str(out)]) == 0
+    shown = call(main, file, '--frames', 'unknown', '--params', PLATFORM, '--output', out).out
     frames = json.loads((out / 'calibration.json').read_text())['frames']
     place = -camera.rotation.T @ camera.position
     for key, expected in (('device_in_base', place), ('target_in_platform', target.position)):
         # the joints that define both frames are about a millimeter off
         assert np.linalg.norm(np.array(frames[key]['position_m']) - expected) < 3e-3
-    page, shown = (out / 'report.html').read_text(), capsys.readouterr().out
+    page = (out / 'report.html').read_text()
     number = f'{frames["device_in_base"]["position_m"][0]:.6g}'
     assert all('Device in the base frame' in each and number in each for each in (page, shown))
 
@@ -374,8 +352,7 @@ def test_degrees_read_as_radians_are_named(
     with snapshot.raises(StewartError):
         run(read_poses(path, HEXAPOD.parameters), str(path), HEXAPOD.parameters, tmp_path / 'out',
             CalibrationOptions())
-    assert main([str(path), '--params', str(PLATFORM), '--degrees', '--output',
-                 str(tmp_path / 'out')]) == 0
+    call(main, path, '--params', PLATFORM, '--degrees', '--output', tmp_path / 'out')
 
 
 @pytest.mark.parametrize(('value', 'error', 'text'), [
@@ -389,49 +366,37 @@ def test_tables_have_no_more_digits_than_mean_something(
 def write_bag(folder: Path, rng: np.random.Generator, lengths: np.ndarray, seen: Pose,
               *leg_topics: str, joints: Sequence[str] = JOINTS) -> Path:
     """Write a bag of a platform that stops in each pose; legs at 100 Hz, a tracker at 20 Hz."""
-    types = get_typestore(Stores.ROS2_JAZZY)
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        legs = [writer.add_connection(topic, 'sensor_msgs/msg/JointState', typestore=types)
-                for topic in leg_topics]
-        device = writer.add_connection('/tracker', 'geometry_msgs/msg/PoseStamped',
-                                       typestore=types)
-        states, poser = JointStateWriter(joints), StampedWriter('tracker', 7)
-        for n in range(len(lengths)):
-            for tick in range(100):
-                # A second for each pose, of which 0.3 s lead to the next one.
-                stamp = 10 ** 9 + n * 10 ** 9 + tick * 10 ** 7
-                part = max(0.0, (tick - 70) / 30.0)
-                following = min(n + 1, len(lengths) - 1)
-                row = lengths[n] + part * (lengths[following] - lengths[n])
-                noise = 1e-6 * rng.normal(size=6)
-                state = states.write(stamp, row + noise, [0.0] * 6, None)
-                for each in legs:
-                    writer.write(each, stamp, state)
-                if tick % 5 == 0:
-                    position = seen.position[n] + part * (
-                        seen.position[following] - seen.position[n])
-                    sign = 1.0 if tick % 2 else -1.0  # of the same rotation
-                    writer.write(device, stamp, poser.write(
-                        stamp, [*position, *(sign * seen.quaternion[n])]))
-    return folder
+    n, tick = np.divmod(np.arange(100 * len(lengths)), 100)
+    # A second for each pose, of which 0.3 s lead to the next one.
+    stamps = SECOND + 10 * MS * np.arange(len(n))
+    part = np.maximum(0.0, (tick - 70) / 30.0)[:, None]
+    following = np.minimum(n + 1, len(lengths) - 1)
+    noise = 1e-6 * rng.normal(size=(len(n), 6))
+    rows = lengths[n] + part * (lengths[following] - lengths[n]) + noise
+    positions = seen.position[n] + part * (seen.position[following] - seen.position[n])
+    turns = np.where(tick % 2, 1.0, -1.0)[:, None] * seen.quaternion[n]  # the same rotation
+    poser = StampedWriter('tracker', 7)
+    of = [each for topic in leg_topics
+          for each in leg_states(stamps, joints, rows, None, None, topic)]
+    of += [('/tracker', stamp, poser.write(stamp, row)) for stamp, row in zip(
+        stamps[::5].tolist(), np.hstack([positions, turns])[::5].tolist(), strict=True)]
+    return messages.write_bag(folder, of, tracker=messages.POSE, **dict.fromkeys(
+        (topic.rpartition('/')[2] for topic in leg_topics), messages.JOINT_STATE))
 
 
-def test_poses_of_a_bag_at_rest(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+def test_poses_of_a_bag_at_rest(tmp_path: Path, snapshot: Snapshot) -> None:
     rng = np.random.default_rng(3)
     values, poses = true_values(rng), random_poses(rng, 30)
     folder = write_bag(tmp_path / 'bag', rng, *measured(rng, values, poses), '/joint_states')
     output = tmp_path / 'out'
-    assert main([str(folder), '--params', str(PLATFORM), '--output', str(output)]) == 0
+    call(main, folder, '--params', PLATFORM, '--output', output)
     result = json.loads((output / 'calibration.json').read_text())
     assert result['poses'] == {
         'source': str(folder), 'legs': '/joint_states', 'pose': '/tracker', 'read': 30,
         'used': 30, 'notices': [WITHOUT_CHECKSUMS]}
     found = np.array([each['value'] for each in result['parameters']])
     assert np.abs(found - values[:42]).max() < 1e-4
-    capsys.readouterr()
-    assert main([str(folder), '--params', str(PLATFORM), '--pose', '/other']) == 2
-    snapshot(capsys.readouterr().err)
+    snapshot(call(main, folder, '--params', PLATFORM, '--pose', '/other', code=2).err)
 
 
 @pytest.mark.parametrize(('names', 'measured_legs'), [
@@ -488,8 +453,7 @@ def test_tables_name_their_column_and_have_no_negative_zero() -> None:
 
 
 def test_a_design_identifies_better_than_random_poses(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str],
-        monkeypatch: pytest.MonkeyPatch, snapshot: Snapshot) -> None:
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, snapshot: Snapshot) -> None:
     found = design_poses(HEXAPOD, 24, seed=1)
     assert (found.half_widths < found.random_half_widths).all()
     # The prediction is that of a fit to such poses.
@@ -501,9 +465,9 @@ def test_a_design_identifies_better_than_random_poses(
     errors = 1.959964 * np.sqrt(np.diag(fitted.covariance))[:42]
     np.testing.assert_allclose(errors, found.half_widths, rtol=0.01)
     monkeypatch.chdir(tmp_path)
-    assert main(['--design', '8', '--params', str(PLATFORM), '--output', 'calibrated',
-                 '--rest', '1']) == 0
-    assert 'designed  random poses' in capsys.readouterr().out
+    out = call(main, '--design', '8', '--params', PLATFORM, '--output', 'calibrated', '--rest',
+               '1').out
+    assert 'designed  random poses' in out
     poses = read_poses(tmp_path / 'calibrated' / 'poses.csv', HEXAPOD.parameters)
     limits = HEXAPOD.parameters
     lengths = HEXAPOD.inverse_kinematics(poses.poses)
@@ -521,8 +485,7 @@ def test_a_design_identifies_better_than_random_poses(
     for position in poses.poses.position:
         still = np.abs(table[:, 1:4] - position).max(axis=1) < 1e-9
         assert np.ptp(table[still, 0]) > 0.99
-    assert main(['--design', '7', '--params', str(PLATFORM)]) == 2
-    snapshot(capsys.readouterr().err)
+    snapshot(call(main, '--design', '7', '--params', PLATFORM, code=2).err)
     with snapshot.raises(ParameterError):
         design_poses(StewartPlatform(HEXAPOD.parameters.replaced(
             {'limits.length_min': None, 'limits.length_max': None})), 10)

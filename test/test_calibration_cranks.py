@@ -19,6 +19,7 @@ from crank_platforms import parameters_of
 from measured_cranks import ANGLE_NOISE, Built, POSITION_NOISE
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
+from programs import call
 import pytest
 from referees import ROOT
 from snapshot import Snapshot
@@ -402,12 +403,10 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_files_page_and_text(
-        table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_page_and_text(table: Path, tmp_path: Path) -> None:
     output = tmp_path / 'out'
     arguments = [str(table), '--params', str(FILE), '--output', str(output)]
-    assert main([*arguments, '--unknowns', 'zero', '--strict']) == 0
-    shown = capsys.readouterr().out
+    shown = call(main, *arguments, '--unknowns', 'zero', '--strict').out
     assert shown.startswith('the crank of leg_2 sits one tooth (14.4 deg of 25')
     assert shown.count('geometry.crank_directions.leg_') == 6 and 'fixed' not in shown
     result = json.loads((output / 'calibration.json').read_text())
@@ -425,14 +424,12 @@ def test_files_page_and_text(
     assert 'zeros [mrad]' in page and 'length of a rod by geometry' in page
     text = (output / 'calibrated.yaml').read_text()
     assert 'crank_directions: [  # calibrated' in text and '95 %: within +-' in text
-    assert main([*arguments, '--force']) == 0
+    call(main, *arguments, '--force')
     page = (output / 'report.html').read_text()
     assert page.count('<svg') == 5 and 'axes of motors [mrad]' in page
 
 
-def test_angles_in_degrees_are_read(table: Path, tmp_path: Path,
-                                    capsys: pytest.CaptureFixture[str],
-                                    snapshot: Snapshot) -> None:
+def test_angles_in_degrees_are_read(table: Path, tmp_path: Path, snapshot: Snapshot) -> None:
     given = read_poses(table, RIG)
     first, *rows = poses_csv(
         RIG.joints, np.degrees(given.positions), given.poses).splitlines()
@@ -443,34 +440,30 @@ def test_angles_in_degrees_are_read(table: Path, tmp_path: Path,
     for found in (read_poses(plain, RIG, degrees=True), read_poses(headed, RIG)):
         assert_allclose(found.positions, given.positions, atol=1e-15)
     arguments = ['--params', str(FILE), '--unknowns', 'zero', '--output', str(tmp_path / 'out')]
-    assert main([str(plain), *arguments]) == 2
-    assert 'are in degrees, not in rad: --degrees reads them so' in capsys.readouterr().err
-    assert main([str(plain), *arguments, '--mm-legs']) == 2
-    snapshot(capsys.readouterr().err.replace(str(ROOT), ''))
-    assert main([str(plain), *arguments, '--degrees']) == 0
+    error = call(main, plain, *arguments, code=2).err
+    assert 'are in degrees, not in rad: --degrees reads them so' in error
+    snapshot(call(main, plain, *arguments, '--mm-legs', code=2).err.replace(str(ROOT), ''))
+    call(main, plain, *arguments, '--degrees')
 
 
-def test_one_row_is_calibrated_by_the_program(
-        table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_row_is_calibrated_by_the_program(table: Path, tmp_path: Path) -> None:
     one = tmp_path / 'one.csv'
     one.write_text('\n'.join(table.read_text().splitlines()[:2]))
     arguments = [str(one), '--params', str(FILE), '--unknowns', 'zero']
-    assert main([*arguments, '--output', str(tmp_path / 'a'), '--strict']) == 0
-    assert 'no intervals: as many residuals as unknowns' in capsys.readouterr().out
+    out = call(main, *arguments, '--output', tmp_path / 'a', '--strict').out
+    assert 'no intervals: as many residuals as unknowns' in out
     result = json.loads((tmp_path / 'a' / 'calibration.json').read_text())
     assert result['noise'] is None
     assert all(each['interval'] is None for each in result['parameters'])
     assert 'nan' not in (tmp_path / 'a' / 'report.html').read_text()
     noise = ['--noise', *map(str, NOISE)]
-    assert main([*arguments, *noise, '--output', str(tmp_path / 'b')]) == 0
-    assert 'noise as given: angles 3.5 mrad' in capsys.readouterr().out
+    out = call(main, *arguments, *noise, '--output', tmp_path / 'b').out
+    assert 'noise as given: angles 3.5 mrad' in out
 
 
-def test_designed_poses_are_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                    capsys: pytest.CaptureFixture[str]) -> None:
+def test_designed_poses_are_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(['--design', '6', '--unknowns', 'zero,lengths', '--params', str(FILE)]) == 0
-    shown = capsys.readouterr().out
+    shown = call(main, '--design', '6', '--unknowns', 'zero,lengths', '--params', FILE).out
     assert 'legs.crank.length' in shown and 'base_joints' not in shown
     found = read_poses(tmp_path / 'designed' / 'poses.csv', RIG)
     assert_allclose(StewartPlatform(RIG).inverse_kinematics(found.poses), found.positions,

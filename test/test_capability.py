@@ -15,10 +15,8 @@ from referees import (
     random_direction, random_motion, random_parameters, rng, rotation_about, size_of)
 from snapshot import Snapshot
 from stewart_dynamics import (
-    BaseMotion, Capability, Motion, MotionError, ParameterError, Parameters, Pose, StewartPlatform)
+    Capability, Motion, MotionError, ParameterError, Parameters, Pose, StewartPlatform)
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.datasheet.pose_ratings import Payloads
-from stewart_dynamics.mechanics.dynamics.linear_parameters import with_point_mass
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 PLATFORM = StewartPlatform.from_yaml(CONFIG / 'platform.yaml')
@@ -72,159 +70,6 @@ def test_an_axis_through_a_platform_joint_does_not_end_the_travel(away: float) -
         assert found.limit == nearby.limit
 
 
-def test_the_wrench_at_the_limit_brings_a_leg_to_its_largest_force() -> None:
-    for seed in range(200):
-        random = rng(seed)
-        platform, pose = limited(random)
-        capability = Capability(platform)
-        bounds = platform.parameters['limits.force_max']
-        for direction in random.normal(size=(5, 6)):
-            found = capability.wrench(pose, direction)
-            forces = platform.inverse_dynamics(
-                Motion.from_pose(pose), wrench=-found.value * direction).forces
-            ratios = np.abs(forces) / bounds
-            assert found.limit == 'force_max'
-            assert ratios.argmax() == found.leg
-            assert ratios.max() == pytest.approx(1.0, abs=1e-12)
-
-
-def test_the_acceleration_at_the_limit_brings_a_leg_to_its_largest_force() -> None:
-    for seed in range(100):
-        random = rng(seed)
-        platform, pose = limited(random)
-        twist = Motion(pose.position, pose.rotation, 0.1 * random.normal(size=3),
-                       0.1 * random.normal(size=3))
-        direction = random.normal(size=6)
-        for motion in (None, twist):
-            found = Capability(platform).acceleration(pose, direction, motion)
-            velocity = (np.zeros(3), np.zeros(3)) if motion is None else (
-                twist.linear_velocity, twist.angular_velocity)
-            forces = platform.inverse_dynamics(Motion(
-                pose.position, pose.rotation, *velocity, found.value * direction[:3],
-                found.value * direction[3:])).forces
-            ratios = np.abs(forces) / platform.parameters['limits.force_max']
-            if found.value > 0.0:
-                assert ratios.max() == pytest.approx(1.0, abs=1e-11)
-                assert ratios.argmax() == found.leg
-            else:
-                assert ratios.max() > 1.0
-
-
-def test_the_force_in_every_direction_is_the_smallest_of_all_directions() -> None:
-    random = rng()
-    platform, pose = limited(random)
-    capability = Capability(platform)
-    directions = np.array([random_direction(random) for _ in range(20000)])
-    for value, place in ((capability.force(pose), 0), (capability.moment(pose), 3)):
-        wrenches = np.zeros((len(directions), 6))
-        wrenches[:, place:place + 3] = directions
-        values = capability.wrench(pose, wrenches).value
-        assert value <= values.min()
-        assert value == pytest.approx(values.min(), rel=1e-2)
-
-
-def test_the_velocity_at_the_limit_brings_a_leg_to_its_largest_rate() -> None:
-    for seed in range(100):
-        random = rng(seed)
-        platform, pose = limited(random)
-        direction = random.normal(size=6)
-        found = Capability(platform).velocity(pose, direction)
-        rates = platform.inverse_jacobian(pose) @ (found.value * direction)
-        ratios = np.abs(rates) / platform.parameters['limits.velocity_max']
-        assert ratios.max() == pytest.approx(1.0, abs=1e-13)
-        assert ratios.argmax() == found.leg
-
-
-def test_the_payload_at_the_limit_brings_a_leg_to_its_largest_force() -> None:
-    for seed in range(60):
-        random = rng(seed)
-        platform, pose = limited(random)
-        center = 0.3 * random.normal(size=3)
-        motion = random_motion(platform.parameters, random, 20)
-        for given in (pose, motion):
-            found = Capability(platform).payload(given, center)
-            if found.value == 0.0 or math.isinf(found.value):
-                continue
-            p = platform.parameters
-            mass, more = p['platform.mass'], found.value
-            both = (mass * p['platform.center_of_mass'] + more * center) / (mass + more)
-            six = p['platform.inertia']
-            inertia = np.array([[six[0], six[1], six[2]], [six[1], six[3], six[4]],
-                                [six[2], six[4], six[5]]])
-            for m, c in ((mass, p['platform.center_of_mass']), (more, center)):
-                d = c - both
-                inertia = inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
-            heavier = StewartPlatform(p.replaced({
-                'platform.mass': mass + more, 'platform.center_of_mass': both,
-                'platform.inertia': inertia[np.triu_indices(3)]}))
-            moving = given if isinstance(given, Motion) else Motion.from_pose(given)
-            ratios = np.abs(heavier.inverse_dynamics(moving).forces) / p['limits.force_max']
-            assert ratios.max() == pytest.approx(1.0, abs=1e-9)
-            assert ratios.reshape(-1, 6)[found.sample or 0].argmax() == found.leg
-
-
-def with_joint_limit(random: np.random.Generator) -> tuple[StewartPlatform, Pose, Array]:
-    """Return a hexapod whose joints limit, though its actuators give far larger forces."""
-    platform, pose = limited(random, **{
-        'actuator.reflected_mass': 500.0, 'actuator.screw_lead': 0.02, 'actuator.coulomb_friction':
-        200.0, 'drive.screw_rotation': str(random.choice(['guided', 'universal']))})
-    rest = Motion.from_pose(pose)
-    bounds = np.abs(platform.inverse_dynamics(rest).joint_forces).max() * random.uniform(
-        1.01, 5.0, 6)
-    return StewartPlatform(platform.parameters.replaced({
-        'limits.force_max': None, 'limits.joint_force_max': bounds})), pose, bounds
-
-
-@pytest.mark.parametrize('seed', range(20))
-def test_loads_at_the_limit_bring_a_joint_to_its_largest_force(seed: int) -> None:
-    random = rng(seed)
-    platform, pose, bounds = with_joint_limit(random)
-    capability, direction, center = Capability(platform), random.normal(size=6), np.ones(3)
-    rest = Motion.from_pose(pose)
-
-    def ratios(motion: Motion, wrench: Array | None = None, base: Any = None) -> Array:
-        return np.abs(platform.inverse_dynamics(motion, wrench, base).joint_forces) / bounds
-
-    wrench = capability.wrench(pose, direction)
-    acceleration = capability.acceleration(pose, direction)
-    payload = capability.payload(pose, center)
-    gravity = platform.parameters['gravity']
-    weight = np.concatenate([gravity, np.cross(pose.rotation @ center, gravity)])
-    for found, at in (
-            (wrench, ratios(rest, -wrench.value * direction)),
-            (acceleration, ratios(Motion(
-                pose.position, pose.rotation, np.zeros(3), np.zeros(3),
-                *np.split(acceleration.value * direction, 2)))),
-            (payload, ratios(rest, payload.value * weight))):
-        assert (found.limit, found.leg) == ('joint_force_max', at.argmax())
-        assert at.max() == pytest.approx(1.0, abs=1e-9)
-    directions = np.zeros((2000, 6))
-    directions[:, :3] = [random_direction(random) for _ in range(2000)]
-    every = capability.wrench(pose, directions).value.min()
-    assert capability.force(pose) == pytest.approx(every, rel=0.05)
-    assert capability.force(pose) <= every
-    assert Payloads(capability, pose[None]).level() == pytest.approx(
-        capability.payload(pose, np.zeros(3)).value, rel=1e-9)
-
-
-@pytest.mark.parametrize('seed', range(10))
-def test_a_payload_beside_a_load_on_a_moving_base_brings_a_leg_to_its_limit(seed: int) -> None:
-    random = rng(seed)
-    platform, _ = limited(random)
-    p = platform.parameters
-    motion = random_motion(p, random, 5)
-    wrench = 0.1 * random.normal(size=6)
-    base = BaseMotion(p.gravity, *random.normal(size=(3, 3)))
-    still = platform.inverse_dynamics(motion, wrench, base, singular='nan')
-    p = p.replaced({'limits.force_max': 10.0 + 1.5 * np.abs(still.forces).max()})
-    center = 0.3 * random.normal(size=3)
-    found = Capability(StewartPlatform(p)).payload(motion, center, wrench=wrench, base=base)
-    heavier = StewartPlatform(with_point_mass(p, found.value, center))
-    ratios = np.abs(heavier.inverse_dynamics(motion, wrench, base).forces) / p.limits.force_max
-    assert ratios.max() == pytest.approx(1.0, abs=1e-9)
-    assert ratios[found.sample].argmax() == found.leg
-
-
 def test_the_joints_of_a_stuck_leg_limit_though_its_actuator_does_not() -> None:
     parameters = PLATFORM.parameters.replaced({
         'limits.force_max': 700.0, 'limits.joint_force_max': 1500.0})
@@ -238,28 +83,6 @@ def test_the_joints_of_a_stuck_leg_limit_though_its_actuator_does_not() -> None:
                 Motion.from_pose(home), -sign * value * wrench).joint_forces))
     assert 700.0 < largest[0] <= 1500.0 * (1.0 + 1e-9)
     assert (largest[1:] <= 700.0 * (1.0 + 1e-9)).all()
-
-
-@pytest.mark.parametrize('seed', range(10))
-def test_a_motion_can_be_faster_and_larger_until_a_joint_reaches_its_limit(seed: int) -> None:
-    random = rng(seed)
-    platform, pose, _ = with_joint_limit(random)
-    motion = random_motion(platform.parameters, random, 30)
-    static = platform.inverse_dynamics(Motion(motion.position, motion.rotation), singular='nan')
-    bounds = 50.0 + 2.0 * np.abs(static.joint_forces).max(axis=0)
-    platform = StewartPlatform(platform.parameters.replaced({
-        'limits.length_min': None, 'limits.length_max': None, 'limits.velocity_max': None,
-        'limits.joint_force_max': bounds}))
-    capability = Capability(platform)
-    faster = capability.speed_factor(motion)
-    k = faster.value
-    solved = platform.inverse_dynamics(Motion(
-        motion.position, motion.rotation, k * motion.linear_velocity, k * motion.angular_velocity,
-        k * k * motion.linear_acceleration, k * k * motion.angular_acceleration))
-    assert faster.limit == 'joint_force_max'
-    assert (np.abs(solved.joint_forces) / bounds).max() == pytest.approx(1.0, abs=1e-9)
-    larger = capability.amplitude_factor(motion)
-    assert larger.limit in ('joint_force_max', 'singularity')
 
 
 @pytest.mark.parametrize('seed', range(24))
@@ -417,37 +240,6 @@ def test_a_travel_from_outside_the_limits_is_zero() -> None:
     assert (found.value, found.limit) == (0.0, 'length_max')
 
 
-@pytest.mark.parametrize('seed', range(30))
-def test_a_motion_as_much_faster_as_it_can_be_reaches_its_limit(seed: int) -> None:
-    random = rng(seed)
-    platform, _ = limited(random)
-    motion = random_motion(platform.parameters, random, 50)
-    static = Motion(motion.position, motion.rotation)
-    parameters = platform.parameters.replaced({
-        'limits.length_min': None, 'limits.length_max': None,
-        'limits.force_max': 200.0 + 1.5 * np.abs(
-            platform.inverse_dynamics(static, singular='nan').forces).max(axis=0)})
-    platform = StewartPlatform(parameters)
-    wrench = 50.0 * random.normal(size=6)
-    found = Capability(platform).speed_factor(motion, wrench)
-
-    def ratio(factor: float) -> float:
-        faster = Motion(motion.position, motion.rotation, factor * motion.linear_velocity,
-                        factor * motion.angular_velocity,
-                        factor ** 2 * motion.linear_acceleration,
-                        factor ** 2 * motion.angular_acceleration)
-        solved = platform.inverse_dynamics(faster, wrench)
-        return max((np.abs(solved.rates) / parameters['limits.velocity_max']).max(),
-                   (np.abs(solved.forces) / parameters['limits.force_max']).max())
-
-    if found.value > 0.0:
-        assert ratio(found.value) == pytest.approx(1.0, abs=1e-9)
-        assert ratio(found.value * (1.0 + 1e-6)) > 1.0
-        assert max(ratio(k) for k in np.linspace(0.0, found.value, 200)) <= 1.0 + 1e-9
-    else:
-        assert ratio(0.0) > 1.0
-
-
 def test_answers_have_the_leading_shapes_of_poses_and_directions() -> None:
     capability = Capability(PLATFORM)
     home = PLATFORM.home_pose()
@@ -516,17 +308,6 @@ def test_a_singular_pose_has_no_travel_whatever_the_threshold() -> None:
     assert set(found.limit) == {'singularity'}
 
 
-def test_a_tilted_base_changes_the_wrench() -> None:
-    tilted = BaseMotion([3.0, 0.0, -9.3])
-    home = PLATFORM.home_pose()
-    direction = np.eye(6)[2]
-    found = Capability(PLATFORM).wrench(home, direction, tilted)
-    forces = PLATFORM.inverse_dynamics(
-        Motion.from_pose(home), wrench=-found.value * direction, base=tilted).forces
-    assert (np.abs(forces) / PLATFORM.parameters['limits.force_max']).max() == pytest.approx(
-        1.0, abs=1e-12)
-
-
 @pytest.mark.parametrize('ask', [
     lambda c, home: c.wrench(home, np.eye(6)[0]),
     lambda c, home: c.force(home),
@@ -564,32 +345,6 @@ def test_a_direction_of_zeros_is_rejected(snapshot: Snapshot) -> None:
 
 
 # Stiffness
-
-def test_stiffness_is_the_derivative_of_the_wrench_of_loaded_springs() -> None:
-    random = rng()
-    for seed in range(4):
-        platform, pose = limited(rng(seed))
-        legs = random.uniform(1e5, 1e6, 6)
-        lengths = platform.inverse_kinematics(pose)
-        forces = platform.inverse_dynamics(Motion.from_pose(pose)).forces
-
-        def wrench(by: float, direction: Array, *given: Any) -> Array:
-            platform, pose, legs, lengths, forces = given
-            at = moved(pose, direction, np.zeros(3), np.array([by]))[0]
-            pushed = forces + legs * (lengths - platform.inverse_kinematics(at))
-            return np.asarray(platform.inverse_jacobian(at).T @ pushed)
-
-        capability, given = Capability(platform), (platform, pose, legs, lengths, forces)
-        found = capability.stiffness(pose, legs)
-        for direction in np.eye(6):
-            change = (wrench(-1e-5, direction, *given) - wrench(1e-5, direction, *given)) / 2e-5
-            np.testing.assert_allclose(found @ direction, change, rtol=0.0,
-                                       atol=1e-8 * np.abs(found).max())
-        # With the weight the whole is the second derivative of an energy.
-        total = found + capability._weight_stiffness(pose)
-        part = np.abs(total - platform.stiffness(pose, legs)).max()
-        np.testing.assert_allclose(total, total.T, rtol=0.0, atol=1e-7 * part)
-
 
 def test_stiffness_of_a_cubic_hexapod_is_the_closed_form() -> None:
     a, k = 0.5, 1e6

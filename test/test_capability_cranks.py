@@ -8,26 +8,21 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from cases import few
-from crank_machines import random_machine, random_state
-from crank_newton_euler import CrankHexapod, State
-from crank_platforms import base_of, motion_of, parameters_of
+from crank_machines import random_machine
+from crank_newton_euler import CrankHexapod
+from crank_platforms import parameters_of
 import numpy as np
 import pytest
 from referees import random_direction, rng, ROOT, rotation_about
 from stewart_dynamics import (
-    BaseMotion, Capability, Motion, Parameters, Pose, StewartPlatform)
+    Capability, Motion, Parameters, Pose, StewartPlatform)
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.capability.capability import Extent
-from stewart_dynamics.capability.motions import Deviations, faster
 from stewart_dynamics.errors import MotionError, ParameterError, ReachError
-from stewart_dynamics.mechanics.dynamics.linear_parameters import with_point_mass
 
 FILE = ROOT / 'config' / 'crank_platform.yaml'
 MACHINES, TRAVELS = range(100), 20
 POINTS = 2001  # of a scan
 INSIDE, OUTSIDE = 1e-9, 1e-6  # of a travel: nothing is exceeded before, its limit behind
-EXACT = 1e-9
-POSITIVE = np.concatenate([np.eye(6), -np.eye(6)])
 
 
 class Scan(NamedTuple):
@@ -177,193 +172,6 @@ def test_travels_agree_with_a_dense_scan(first: int) -> None:
         assert not wrong
         ends |= set(limits)
     assert {'angle_max', 'angle_min', 'lever_min'} <= ends
-
-
-def loaded(seed: int, **more: Any) -> tuple[CrankHexapod, StewartPlatform, list[State]]:
-    """Return a machine with heavy cranks and rods, limits of loads and speeds, and states."""
-    random = rng(seed)
-    machine = random_machine(random, random.choice([1.0, 20.0]))
-    states = [random_state(machine, random) for _ in range(6)]
-    rest = StewartPlatform(parameters_of(machine)).inverse_dynamics(
-        Motion(machine.home, np.eye(3)))
-    torque, force = np.abs(rest.torques).max(), np.abs(rest.joint_forces).max()
-    part = seed % 3  # that limits: torques, rod forces, or both
-    return machine, StewartPlatform(parameters_of(machine, **{
-        'limits.torque_max': None if part == 1 else torque * random.uniform(4.0, 8.0, 6),
-        'limits.rod_force_max': None if part == 0 else force * random.uniform(4.0, 8.0, 6),
-        'limits.speed_max': random.uniform(1.0, 5.0, 6), **more})), states
-
-
-def ratios(platform: StewartPlatform, motion: Motion, wrench: Any = None,
-           base: BaseMotion | None = None) -> dict[str, Array]:
-    """Return loads by their limits (..., 6)."""
-    result, p = platform.inverse_dynamics(motion, wrench, base), platform.parameters
-    found = {'crank_torque_max': (result.torques, p.limits.torque_max),
-             'rod_force_max': (result.joint_forces, p.limits.rod_force_max)}
-    return {name: np.abs(values) / most for name, (values, most) in found.items()
-            if most is not None}
-
-
-def assert_at_limit(extent: Extent, found: dict[str, Array]) -> None:
-    """Check that the largest ratio is 1, at the leg and limit that are named."""
-    if extent.value == 0.0:
-        assert max(each.max() for each in found.values()) > 1.0
-        return
-    assert abs(max(each.max() for each in found.values()) - 1.0) < EXACT
-    assert abs(found[extent.limit].reshape(-1, 6)[:, extent.leg].max() - 1.0) < EXACT
-
-
-def still(state: State) -> Motion:
-    return Motion(state.t, state.R)
-
-
-@pytest.mark.parametrize('seed', few(range(12), 4))
-def test_loads_are_confirmed_by_inverse_dynamics(seed: int) -> None:
-    _, platform, states = loaded(seed)
-    c, random, values = Capability(platform), rng(seed + 100), []
-    for state in states:
-        pose, base = still(state), base_of(state)
-        way = random.normal(size=6)
-        wrench = c.wrench(pose, way, base)
-        assert_at_limit(wrench, ratios(platform, pose, -wrench.value * way, base))
-        point = random.normal(size=3) * 0.2
-        payload = c.payload(Pose(state.t, state.R), point)
-        more = StewartPlatform(with_point_mass(platform.parameters, payload.value, point))
-        assert_at_limit(payload, ratios(more, pose))
-        moving = Motion(state.t, state.R, 0.1 * state.v, 0.1 * state.w)
-        acceleration = c.acceleration(pose, way, moving)
-        rows = moving.rows.copy()
-        rows[18:] = acceleration.value * way
-        assert_at_limit(acceleration, ratios(platform, Motion.of_rows(rows)))
-        carried = c.payload(motion_of(state), point, wrench=state.wrench, base=base)
-        more = StewartPlatform(with_point_mass(platform.parameters, carried.value, point))
-        assert_at_limit(carried, ratios(more, motion_of(state), state.wrench, base))
-        velocity = c.velocity(pose, way)
-        speeds = platform.inverse_dynamics(Motion(
-            state.t, state.R, velocity.value * way[:3], velocity.value * way[3:])).speeds
-        part = np.abs(speeds) / platform.parameters.limits.speed_max
-        assert abs(part.max() - 1.0) < EXACT
-        assert velocity.limit == 'crank_speed_max'
-        assert part.argmax() == velocity.leg
-        values += [wrench.value, payload.value, acceleration.value]
-    assert np.count_nonzero(values) > len(values) // 2
-
-
-@pytest.mark.parametrize('seed', few(range(6), 2))
-def test_forces_and_moments_in_every_direction(seed: int) -> None:
-    _, platform, states = loaded(seed)
-    c, random = Capability(platform), rng(seed)
-    for state in states:
-        pose = still(state)
-        for value, part in ((c.force(pose), slice(0, 3)), (c.moment(pose), slice(3, 6))):
-            ways = np.zeros((20000, 6))
-            ways[:, part] = random.normal(size=(20000, 3))
-            ways /= np.linalg.norm(ways, axis=1)[:, None]
-            largest = max(each.max() for each in ratios(
-                platform, pose, float(value) * ways).values())
-            assert largest < 1.0 + EXACT or value == 0.0
-            assert largest > 0.99  # a random direction is nearly the worst one
-
-
-@pytest.mark.parametrize('seed', few(range(9), 3))
-def test_motions_as_fast_and_as_large_as_limits_permit(seed: int) -> None:
-    machine, platform, _ = loaded(seed)
-    c, p = Capability(platform), platform.parameters
-    times, size = np.linspace(0.0, 1.0, 40), 0.04 * machine.crank.mean()
-    phase = 2.0 * np.pi * times[:, None] * np.array([1.0, 1.0, 2.0]) + np.arange(3)
-    rate = 2.0 * np.pi * np.array([1.0, 1.0, 2.0])
-    angles = 0.015 * np.sin(phase[:, ::-1])
-    motion = Motion.from_euler(
-        machine.home + size * np.sin(phase), angles, size * rate * np.cos(phase),
-        0.015 * rate[::-1] * np.cos(phase[:, ::-1]), -size * rate ** 2 * np.sin(phase),
-        -0.015 * rate[::-1] ** 2 * np.sin(phase[:, ::-1]))
-    wrench = 0.1 * p.carried.mass * np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
-
-    def largest(moving: Motion) -> tuple[float, float]:
-        found = ratios(platform, moving, wrench)
-        speeds = np.abs(platform.inverse_dynamics(moving).speeds) / p.limits.speed_max
-        each = {**found, 'crank_speed_max': speeds}
-        return max(float(one.max()) for one in each.values()), float(max(
-            (one[extent.sample, extent.leg] for name, one in each.items()
-             if name == extent.limit), default=0.0))
-
-    extent = c.speed_factor(motion, wrench)
-    assert extent.value > 0.0
-    for k in np.linspace(0.02, 1.0, 50)[:-1] * extent.value:
-        assert largest(Motion.of_rows(faster(motion.rows, k)))[0] < 1.0
-    found = largest(Motion.of_rows(faster(motion.rows, extent.value)))
-    assert np.abs(np.array(found) - 1.0).max() < EXACT
-    extent = c.amplitude_factor(motion, None, wrench)
-    if extent.limit in ('crank_speed_max', 'crank_torque_max', 'rod_force_max'):
-        center = Motion(motion.position[0], motion.rotation[0])
-        rows = Deviations(center, motion.rows).at(extent.value)
-        assert np.abs(np.array(largest(Motion.of_rows(rows))) - 1.0).max() < EXACT
-
-
-def test_motors_limit_the_torques_of_cranks() -> None:
-    machine, _, states = loaded(0)
-    rest = StewartPlatform(parameters_of(machine)).inverse_dynamics(
-        Motion(machine.home, np.eye(3)))
-    continuous = 3.0 * np.abs(rest.torques).max() / 20.0
-    platform = StewartPlatform(parameters_of(machine, **{
-        'drive.gear_ratio': 20.0, 'drive.efficiency': 0.8,
-        'drive.torque_max': 5.0 * np.abs(rest.torques).max() / 20.0, 'drive.speed_max': 60.0,
-        'drive.torque_continuous': continuous}))
-    c = Capability(platform)
-    for state in states:
-        pose = still(state)
-        for way in POSITIVE:
-            extent = c.wrench(pose, way)
-            motors = platform.motors(pose, -extent.value * way)
-            part = np.abs(motors.breakaway_torques) / motors.available_torques
-            assert extent.limit == 'torque_max'
-            assert abs(part.max() - 1.0) < EXACT
-            assert part.argmax() == extent.leg
-            extent = c.velocity(pose, way)
-            moving = Motion(state.t, state.R, extent.value * way[:3], extent.value * way[3:])
-            assert abs(np.abs(platform.motors(moving).speeds).max() / 60.0 - 1.0) < EXACT
-            held = c.wrench(pose, way, continuous=True)
-            torques = platform.motors(pose, -held.value * way).torques
-            assert np.abs(torques).max() <= continuous * (1.0 + EXACT)
-
-
-@pytest.mark.parametrize('seed', range(6))
-def test_stiffness_is_minus_the_derivative_of_the_wrench_of_springs(seed: int) -> None:
-    _, platform, states = loaded(seed)
-    c, springs = Capability(platform), np.linspace(1e3, 6e3, 6)
-    for state in states[:3]:
-        pose = Pose(state.t, state.R)
-        held, angles = platform.inverse_dynamics(Motion.from_pose(pose)).torques, (
-            platform.inverse_kinematics(pose))
-        columns = []
-        for step in 1e-6 * np.eye(6):
-            ends = []
-            for sign in (1.0, -1.0):
-                turn = sign * step[3:]
-                size = float(np.linalg.norm(turn))
-                moved_to = Pose(state.t + sign * step[:3], state.R if size == 0.0 else (
-                    rotation_about(turn / size, size) @ state.R))
-                torques = held - springs * (platform.inverse_kinematics(moved_to) - angles)
-                ends.append(platform.drive_jacobian(moved_to).T @ torques)
-            columns.append((ends[1] - ends[0]) / 2e-6)
-        expected = np.stack(columns, axis=-1)
-        found = c.stiffness(pose, springs)
-        assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
-        still_springs = platform.stiffness(pose, springs)
-        assert np.abs(found - still_springs).max() > 1e-6 * np.abs(expected).max()
-
-
-def test_a_stuck_crank_keeps_its_angle() -> None:
-    _, platform, states = loaded(2)
-    c = Capability(platform)
-    pose = still(states[0])
-    found = c.stuck_leg(pose, 3)
-    for motion in found.motions:
-        speeds = platform.inverse_dynamics(Motion(
-            states[0].t, states[0].R, motion[:3], motion[3:])).speeds
-        assert abs(speeds[3]) < 1e-9 * np.abs(speeds).max()
-    assert found.velocity is not None
-    assert (found.velocity.leg != 3).all()
 
 
 def box_of(machine: CrankHexapod, random: np.random.Generator, size: float) -> Array:

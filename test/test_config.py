@@ -13,13 +13,13 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
+from programs import call
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
 from stewart_dynamics import Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
-from stewart_dynamics.program import DONE
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.output_bag import RECORDED_TYPES, ROBOT_DESCRIPTION
 import yaml
@@ -120,8 +120,8 @@ def test_rviz_shows_every_namespace_of_the_markers_in_the_base_frame() -> None:
 
 
 def test_the_layout_for_bags_shows_topics_of_the_output_bag(tmp_path: Path) -> None:
-    assert main([str(CONFIG.parent / 'bags' / 'clear'), '--params', str(CONFIG / 'platform.yaml'),
-                 '--output', str(tmp_path / 'results'), '--no-report']) == DONE
+    call(main, CONFIG.parent / 'bags' / 'clear', '--params', CONFIG / 'platform.yaml', '--output',
+         tmp_path / 'results', '--no-report')
     with AnyReader([tmp_path / 'results' / 'clear' / 'bag']) as reader:
         written = {each.topic: each.msgtype for each in reader.connections}
     shown = topics_of_foxglove(OF_BAG)

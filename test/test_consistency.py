@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 from pathlib import Path
-import subprocess
 import sys
 from typing import Any
 
 import messages
 from messages import SECOND
 import numpy as np
+from programs import run_program
 import pytest
 from referees import rng, ROOT, symmetric_parameters
 
@@ -382,9 +382,8 @@ def test_nothing_is_imported_while_setpoints_are_answered() -> None:
         '    check.noted.append((n * 1_000_000, row, False))\n'
         '    check.judge()\n'
         'print(sorted({*sys.modules} - before), sorted(check.present))\n')
-    done = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True,
-                          timeout=300, check=True)
-    assert done.stdout == "[] ['acceleration', 'velocity']\n"
+    done = run_program(sys.executable, '-c', script)
+    assert done.out == "[] ['acceleration', 'velocity']\n"
 
 
 def test_the_present_state_follows_the_stream() -> None:

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-import subprocess
 import sys
 
 import numpy as np
+from programs import run_program
 import pytest
 from referees import ROOT
 from snapshot import Snapshot
@@ -51,10 +51,9 @@ print(codes, [name for name in {HEAVY} if sys.modules.get(name)])
 
 def run(arguments: str = '', ros: str = 'with ROS') -> tuple[str, list[str]]:
     """Return what all programs print with these arguments, one after the other in a process."""
-    done = subprocess.run(
-        [sys.executable, '-c', RUN, ros, *(f'{program} {arguments}' for program in PROGRAMS)],
-        check=True, capture_output=True, text=True, timeout=300)
-    return done.stdout, done.stderr.splitlines()
+    done = run_program(
+        sys.executable, '-c', RUN, ros, *(f'{program} {arguments}' for program in PROGRAMS))
+    return done.out, done.err.splitlines()
 
 
 def test_help_and_version_are_answered_without_ros_and_without_a_compiler() -> None:
@@ -66,10 +65,9 @@ def test_help_and_version_are_answered_without_ros_and_without_a_compiler() -> N
 @pytest.mark.parametrize('name', example_names())
 def test_an_example_is_a_parameter_file_to_begin_with(name: str, tmp_path: Path) -> None:
     """It is printed without ROS, read as ROS does, and has no possible error."""
-    done = subprocess.run([sys.executable, '-c', RUN, 'without ROS', f'dynamics --example {name}'],
-                          check=True, capture_output=True, text=True, timeout=300)
-    text, _, last = done.stdout.rstrip().rpartition('\n')
-    assert (f'{text}\n', last, done.stderr) == (example(name), '[0] []', '')
+    done = run_program(sys.executable, '-c', RUN, 'without ROS', f'dynamics --example {name}')
+    text, _, last = done.out.rstrip().rpartition('\n')
+    assert (f'{text}\n', last, done.err) == (example(name), '[0] []', '')
     assert all(len(line) <= 99 for line in text.splitlines())
     file = tmp_path / 'rig.yaml'
     file.write_text(f'{text}\n')
@@ -87,10 +85,9 @@ def test_each_kind_of_legs_has_an_example() -> None:
 
 def test_an_example_that_is_not_there_is_reported_in_one_line(snapshot: Snapshot) -> None:
     for arguments in ('dynamics --example', 'dynamics --example delta'):
-        done = subprocess.run([sys.executable, '-c', RUN, 'without ROS', arguments],
-                              check=True, capture_output=True, text=True, timeout=300)
-        assert done.stdout == '[1] []\n'
-        line, = done.stderr.splitlines()
+        done = run_program(sys.executable, '-c', RUN, 'without ROS', arguments)
+        assert done.out == '[1] []\n'
+        line, = done.err.splitlines()
         snapshot(line)
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import messages
 import numpy as np
 from numpy.typing import NDArray
+from programs import call
 import pytest
 from referees import rng, ROOT
 from stewart_dynamics import (
@@ -23,12 +24,9 @@ from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench, 
 from stewart_dynamics.external_wrench.measured_legs import LegHistory, MeasuredLegs
 from stewart_dynamics.external_wrench.payload import identify
 from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters
-from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.replay.replay_command_line import main as replay
-from stewart_dynamics.setpoints.input_messages import ACCEL, POSE, TWIST
-from test_replay import write_bag
 
 Array = NDArray[np.float64]
 
@@ -187,20 +185,12 @@ def test_the_replay_compares_torques_and_currents_of_the_motors(
     efforts = {'': result.torques, '--motor-torque': motors.torques,
                '--motor-current': motors.currents}[option]
     stamps = [1_700_000_000_000_000_000 + round(1e9 * time) for time in times]
-    joints = JointStateWriter(drives.joints)
-    recorded = []
-    for n, stamp in enumerate(stamps):
-        x = to_quaternion(motion.rotation[n])
-        recorded += [
-            (POSE, stamp, messages.pose(stamp, motion.position[n], x)),
-            (TWIST, stamp, messages.twist(stamp, motion.rows[n, 12:18])),
-            (ACCEL, stamp, messages.accel(stamp, motion.rows[n, 18:24])),
-            ('measured_legs', stamp, joints.write(
-                stamp, result.angles[n], result.speeds[n], efforts[n]))]
-    bag = write_bag(tmp_path / 'bag', recorded, measured_legs='sensor_msgs/msg/JointState')
+    bag = messages.write_bag(tmp_path / 'bag', [
+        *messages.setpoints(np.array(stamps), motion), *messages.leg_states(
+            np.array(stamps), drives.joints, result.angles, result.speeds, efforts)])
     options = [option] * bool(option)
-    assert replay([str(bag), '--params', str(params), '--output', str(tmp_path / 'results'),
-                   '--measured', '/stewart_dynamics/measured_legs', *options]) == 0
+    call(replay, bag, '--params', params, '--output', tmp_path / 'results', '--measured',
+         '/stewart_dynamics/measured_legs', *options)
     summary = json.loads((tmp_path / 'results' / 'bag' / 'summary.json').read_text())
     found = summary['measured']
     assert found['setpoints_compared'] > 990

@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from programs import call
 import pytest
 
 pytest.importorskip('rclpy')
 
 from estimate_cases import CASES, rich  # noqa: E402, I100
+from messages import write_bag  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from referees import rng  # noqa: E402
 from running import (  # noqa: E402
@@ -34,7 +36,7 @@ from stewart_dynamics.mechanics.batch import missing_distances  # noqa: E402
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.messages.joint_state import JointStateWriter  # noqa: E402
 from stewart_dynamics.replay.replay_command_line import main as replay  # noqa: E402
-from test_replay import recorded, write_bag  # noqa: E402
+from test_replay import recorded  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
 CRANKS = ROOT / 'config' / 'crank_platform.yaml'
@@ -112,7 +114,7 @@ def test_answers_have_the_bits_of_the_library_and_of_the_replay(
     bag = write_bag(tmp_path / 'bag', [
         (f'{NODE}/{topic}', stamp, serialize_message(message)) for sample, stamp in sent
         for topic, message in sample.messages(stamp).items()])
-    assert replay([str(bag), '--params', str(CRANKS), '--output', str(tmp_path / 'results')]) == 0
+    call(replay, bag, '--params', CRANKS, '--output', tmp_path / 'results')
     folder = tmp_path / 'results' / 'bag'
     replayed: dict[str, list[bytes]] = {topic: [] for topic in node.raw}
     for topic, _, data in recorded(folder / 'bag' / 'bag.mcap'):
@@ -385,7 +387,7 @@ def test_servos_get_pulses_within_their_points_and_none_elsewhere(
     bag = write_bag(tmp_path / 'bag', [
         (f'{NODE}/{topic}', stamp, serialize_message(message)) for sample, stamp in sent
         for topic, message in sample.messages(stamp).items()])
-    assert replay([str(bag), '--params', str(file), '--output', str(tmp_path / 'results')]) == 0
+    call(replay, bag, '--params', file, '--output', tmp_path / 'results')
     assert [bits(deserialize_message(data, Float64MultiArray).data) for topic, _, data in recorded(
         tmp_path / 'results' / 'bag' / 'bag' / 'bag.mcap') if topic == 'servo_pulses'] == [
             bits(deserialize_message(each, Float64MultiArray).data) for each in pulses]

@@ -29,6 +29,7 @@ from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.simulator.plant import largest_eigenvalue, Plant, PlantState
 from stewart_dynamics.simulator.simulator_parameters import SimulatorParameters
 from test_cranks import parameters_of, RIG
+from test_plant import finite
 
 PROGRAM = 'stewart_simulator'
 
@@ -113,11 +114,6 @@ def set_moving(plant: Plant, twist: Any) -> None:
     """Give it a twist, as if the brakes had been released in motion."""
     plant._plant['state']['twist'][:] = twist
     plant.state = plant._run(0)
-
-
-def finite(state: PlantState) -> bool:
-    """Return whether all numbers of a state are."""
-    return all(map(math.isfinite, (number for part in state for number in part)))
 
 
 # Energy, and motions that are integrated independently
@@ -208,24 +204,6 @@ def test_it_falls_from_home_as_free_bodies_do(
     assert max(map(abs, state.rates)) > 5.0
     truth[3:7] /= np.linalg.norm(truth[3:7])
     assert np.abs(np.array(state.pose + state.twist) - truth).max() < (1e-6 if rubs else 1e-9)
-
-
-@pytest.mark.parametrize('seed', range(4))
-def test_the_accelerations_require_the_torques_that_acted(seed: int) -> None:
-    machine, random = random_machine(rng(seed)), rng(seed)
-    plant = Plant(cranks(machine))
-    weight = machine.m * 9.80665
-    torques = weight * machine.crank * random.uniform(-0.2, 0.2, 6)
-    wrench = 0.2 * weight * random.uniform(-1.0, 1.0, 6) * np.repeat([1.0, machine.crank[0]], 3)
-    for _ in range(3):
-        state = plant.advance(tuple(torques.tolist()), tuple(wrench.tolist()))
-    s = state_of(state)
-    result = StewartPlatform(plant.parameters).inverse_dynamics(
-        PlatformMotion(s.t, s.R, s.v, s.w, state.acceleration[:3], state.acceleration[3:]), wrench)
-    assert relative(result.torques, torques) < 1e-9
-    assert relative(state.positions, result.angles) < 1e-12
-    assert relative(state.rates, result.speeds) < 1e-12
-    assert state.efforts == tuple(torques.tolist())
 
 
 # End stops

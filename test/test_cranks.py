@@ -16,10 +16,9 @@ from crank_platforms import base_of, motion_of, parameters_of, six
 import numpy as np
 import pytest
 from referees import derivative, relative, rng, rotation_about
-from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
+from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError, ReachError, SingularityError
 from stewart_dynamics.mechanics.batch import unreached
-from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters
 
 RIG = json.loads(Path(__file__).with_name('data').joinpath('simulator_rig.json').read_text())
 LEG_MASSES = (0.0, 1.0, 20.0, None)
@@ -81,62 +80,6 @@ def test_random_machines_agree_with_free_bodies(seed: int) -> None:
     machine, platform, states = case(seed)
     for state in states:
         assert_answers(platform, state, inverse_dynamics(machine, state)._asdict(), EXACT)
-
-
-@pytest.mark.parametrize('seed', SEEDS)
-def test_many_samples_have_the_bits_of_each_alone(seed: int) -> None:
-    _, platform, states = case(seed)
-    for some in (states[::3], [state for state in states if state.base]):
-        motions = Motion.of_rows(np.stack([motion_of(state).rows for state in some]))
-        wrenches = np.stack([state.wrench for state in some])
-        bases = [base_of(state) for state in some]
-        base = None if bases[0] is None else BaseMotion(*(
-            np.stack(part) for part in zip(*(
-                (each.gravity, each.linear_acceleration, each.angular_velocity,
-                 each.angular_acceleration) for each in bases if each is not None), strict=True)))
-        many = platform.inverse_dynamics(motions, wrenches, base)
-        forward = platform.forward_dynamics(motions, many.torques, wrenches, base)
-        for n, state in enumerate(some):
-            alone = platform.inverse_dynamics(motion_of(state), state.wrench, base_of(state))
-            assert alone.rows.tobytes() == many.rows[n].tobytes()
-            one = platform.forward_dynamics(
-                motion_of(state), alone.torques, state.wrench, base_of(state))
-            assert one.rows.tobytes() == forward.rows[n].tobytes()
-
-
-@pytest.mark.parametrize('seed', SEEDS)
-def test_forces_are_those_of_the_readable_equations(seed: int) -> None:
-    _, platform, states = case(seed)
-    p = platform.parameters
-    for state in states:
-        motion, base = motion_of(state), base_of(state)
-        result = platform.inverse_dynamics(motion, state.wrench, base)
-        twist, acceleration = np.hstack([state.v, state.w]), np.hstack([state.a, state.al])
-        load = (platform.mass_matrix(motion) @ acceleration
-                + platform.coriolis_matrix(motion, base=base) @ twist
-                + platform.gravity_vector(motion, base) - state.wrench)
-        friction = p.actuator.viscous_friction * result.speeds + p.actuator.coulomb_friction * (
-            np.clip(result.speeds / p.actuator.coulomb_velocity, -1.0, 1.0))
-        torques = np.linalg.solve(platform.drive_jacobian(motion).T, load) + friction
-        assert relative(torques, result.torques) < EXACT
-
-
-@pytest.mark.parametrize('seed', SEEDS)
-def test_regressor_and_breakdown_sum_to_the_torques(seed: int) -> None:
-    _, platform, states = case(seed)
-    theta = linear_parameters(platform.parameters)
-    for state in states:
-        motion, base = motion_of(state), base_of(state)
-        regressor = platform.regressor(motion, base)
-        torques = platform.inverse_dynamics(motion, None, base).torques
-        assert regressor.matrix.shape == (6, len(regressor.names)) == (6, len(theta))
-        assert relative(regressor.matrix @ theta, torques) < EXACT
-        parts = platform.force_breakdown(motion, state.wrench, base)
-        assert relative(
-            parts.total, platform.inverse_dynamics(motion, state.wrench, base).torques) < EXACT
-        still = None if base is None else BaseMotion(base.gravity)
-        resting = platform.inverse_dynamics(Motion(state.t, state.R), None, still)
-        assert relative(parts.gravity, resting.torques) < EXACT
 
 
 @pytest.mark.parametrize('seed', SEEDS)
@@ -215,19 +158,6 @@ def test_the_work_of_the_torques_is_the_change_of_energy(seed: int) -> None:
     power = float(result.torques @ result.speeds)
     scale = np.abs(result.torques) @ np.abs(result.speeds)
     assert abs(derivative(energy, 1e-6) - power) < 1e-5 * scale
-
-
-@pytest.mark.parametrize('seed', SEEDS)
-def test_loads_of_the_base(seed: int) -> None:
-    machine, platform, states = case(seed)
-    rest = Motion(states[0].t, states[0].R)
-    weight = np.abs(platform.inverse_dynamics(rest).torques).max()
-    falling = BaseMotion(machine.g, machine.g)
-    assert np.abs(platform.inverse_dynamics(rest, None, falling).torques).max() < 1e-12 * weight
-    turned = rotation_about(np.array([0.6, 0.0, 0.8]), 0.7) @ machine.g
-    by_parameter = StewartPlatform(platform.parameters.replaced({'gravity': turned}))
-    assert relative(platform.inverse_dynamics(rest, None, BaseMotion(turned)).torques,
-                    by_parameter.inverse_dynamics(rest).torques) < EXACT
 
 
 @pytest.mark.parametrize('seed', SEEDS)

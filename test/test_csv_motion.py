@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from programs import call
 import pytest
 from referees import rng, ROOT
 from scipy.spatial.transform import Rotation
@@ -132,40 +133,35 @@ def test_axes_of_other_sources_left_handed_or_not(axes: str, tmp_path: Path) -> 
     close(read_setpoints(write(tmp_path / 'a.csv', columns(source)), axes=axes), MOTION)
 
 
-def test_replay_and_capability_read_the_same_file(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_replay_and_capability_read_the_same_file(tmp_path: Path) -> None:
     path = write(tmp_path / 'motion.csv', columns(MOTION))
-    assert replay([str(path), '--params', str(PARAMS), '--output', str(tmp_path / 'r'),
-                   '--no-report', '--strict']) == 0
+    call(replay, path, '--params', PARAMS, '--output', tmp_path / 'r', '--no-report', '--strict')
     summary = json.loads((tmp_path / 'r' / 'motion' / 'summary.json').read_text())
     assert summary['setpoints']['answered'] == len(TIMES)
     assert not summary['mistakes'] and not summary['rejected'] and not summary['notices']
     forces = PLATFORM.inverse_dynamics(MOTION).forces
     assert summary['legs']['leg_1']['force_peak_n'] == pytest.approx(
         forces[np.abs(forces[:, 0]).argmax(), 0])
-    assert capability(['--params', str(PARAMS), '--motion', str(path), '--output',
-                       str(tmp_path / 'c'), '--strict']) == 0
-    assert 'possible' in capsys.readouterr().out
+    out = call(capability, '--params', PARAMS, '--motion', path, '--output', tmp_path / 'c',
+               '--strict').out
+    assert 'possible' in out
 
 
 def test_a_file_needs_no_other_source_of_setpoints(tmp_path: Path) -> None:
     path = write(tmp_path / 'motion.csv', columns(MOTION))
     params = tmp_path / 'combined.yaml'
     Parameters.from_yaml(PARAMS).replaced({'setpoint.source': 'combined'}).to_yaml(params)
-    assert replay([str(path), '--params', str(params), '--output', str(tmp_path / 'r'),
-                   '--no-report']) == 0
+    call(replay, path, '--params', params, '--output', tmp_path / 'r', '--no-report')
     close(read_setpoints(path, Parameters.from_yaml(params)), MOTION)
 
 
-def test_poses_alone_need_to_be_differentiated(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_poses_alone_need_to_be_differentiated(tmp_path: Path) -> None:
     table = columns(MOTION)
     path = write(tmp_path / 'poses.csv', {
         name: table[name] for name in ('t', 'x', 'y', 'z', 'roll', 'pitch', 'yaw')})
     plain = ['--params', str(PARAMS), '--output', str(tmp_path / 'r'), '--no-report']
-    assert replay([str(path), *plain]) == 2
-    assert '--differentiate computes twist' in capsys.readouterr().err
-    assert replay([str(path), *plain, '--differentiate']) == 0
+    assert '--differentiate computes twist' in call(replay, path, *plain, code=2).err
+    call(replay, path, *plain, '--differentiate')
     found = read_setpoints(path, cutoff=10.0)
     inner = slice(30, -30)
     np.testing.assert_allclose(found.motion.linear_acceleration[inner],
@@ -209,8 +205,7 @@ def test_the_record_of_an_earthquake_is_integrated_with_its_base_line_corrected(
     for end in (0, -1):
         np.testing.assert_allclose(motion.position[end], home, atol=1e-9)
         np.testing.assert_allclose(motion.linear_velocity[end], 0.0, atol=1e-9)
-    assert replay([str(path), '--params', str(PARAMS), '--output', str(tmp_path / 'r'),
-                   '--no-report', '--strict']) == 0
+    call(replay, path, '--params', PARAMS, '--output', tmp_path / 'r', '--no-report', '--strict')
     summary = json.loads((tmp_path / 'r' / 'quake' / 'summary.json').read_text())
     assert not summary['mistakes']
     notice, = summary['notices']
@@ -259,21 +254,19 @@ def test_a_record_with_a_gap_is_not_integrated(tmp_path: Path, snapshot: Snapsho
 # -- advice ---------------------------------------------------------------------------------------
 
 def test_the_command_of_a_report_runs_as_printed(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-        capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     table = {f'{name} "it\'s"': values for name, values in ship(5.0).items()}
     path = write(tmp_path / "the ship's motion <1>.csv", table)
     params = tmp_path / 'my $HOME.yaml'
     params.write_text(PARAMS.read_text())
     columns = ','.join(f'{name}={name} "it\'s"' + (' [deg]' if name in (
         'roll', 'pitch', 'yaw') else '') for name in ship(5.0))
-    assert replay([str(path), '--params', str(params), '--columns', columns, '--output',
-                   str(tmp_path / 'r'), '--differentiate', '--cutoff', '8', '--strict']) == 0
+    call(replay, path, '--params', params, '--columns', columns, '--output', tmp_path / 'r',
+         '--differentiate', '--cutoff', '8', '--strict')
     page = (tmp_path / 'r' / path.stem / 'report.html').read_text()
     command = html.unescape(page.partition('<code>stewart_capability ')[2].partition('</code>')[0])
     monkeypatch.chdir(tmp_path)
-    assert capability(shlex.split(command)) == 0
-    assert 'motion possible' in capsys.readouterr().out
+    assert 'motion possible' in call(capability, *shlex.split(command)).out
 
 
 # -- angles in degrees ----------------------------------------------------------------------------
@@ -384,11 +377,10 @@ def rows(*more: str) -> str:
     't,x,y,z,roll,pitch,yaw,vx,vy,vz\n' + '1,0,0,1,0,0,0,0,0,0\n' * 2,
 ], ids=count())
 def test_a_bad_file_is_named_with_row_column_value_and_rule(
-        text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+        text: str, tmp_path: Path, snapshot: Snapshot) -> None:
     path = tmp_path / 'bad.csv'
     path.write_text(text)
-    assert replay([str(path), '--params', str(PARAMS), '--output', str(tmp_path / 'r')]) == 2
-    error = capsys.readouterr().err
+    error = call(replay, path, '--params', PARAMS, '--output', tmp_path / 'r', code=2).err
     snapshot(error)
     assert error.count('\n') == 1 and not (tmp_path / 'r' / 'bad').exists()
 

@@ -11,11 +11,11 @@ from pathlib import Path
 import sys
 from typing import Any
 
+from messages import SECOND, write_bag
 import numpy as np
+from programs import call
 import pytest
 from referees import PLATFORM, ROOT
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_typestore, Stores
 from snapshot import Snapshot
 from stewart_dynamics import MotionCueing, Parameters
 from stewart_dynamics.cueing.motion_cueing import AXES, OMCT_FREQUENCIES
@@ -41,15 +41,12 @@ def bag_of_imu(folder: Path, stamped: bool = True) -> Path:
     """Write the drive as a bag; one message is not finite."""
     times, forces, rates = drive()
     writer = ImuWriter('driver', 0.0, 0.0)
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        connection = bag.add_connection(
-            '/car/imu', 'sensor_msgs/msg/Imu', typestore=get_typestore(Stores.ROS2_JAZZY))
-        for n, time in enumerate(times.tolist()):
-            received = 10_000_000_000 + round(time * 1e9)
-            force = [np.nan] * 3 if n == 7 else forces[n].tolist()
-            bag.write(connection, received,
-                      writer.write(received * stamped, rates[n].tolist(), force))
-    return folder
+    forces[7] = np.nan
+    return write_bag(folder, (
+        ('/car/imu', stamp, writer.write(stamp * stamped, rate, force))
+        for stamp, rate, force in zip(
+            (10 * SECOND + np.rint(1e9 * times).astype(np.int64)).tolist(), rates.tolist(),
+            forces.tolist(), strict=True)))
 
 
 def result_of(folder: Path) -> dict[str, Any]:
@@ -61,7 +58,7 @@ def result_of(folder: Path) -> dict[str, Any]:
 def test_report_of_a_drive(town: Path, tmp_path: Path) -> None:
     """Figures are those of the library; the motion is taken by stewart_capability."""
     folder = tmp_path / 'out'
-    assert main([str(town), '--params', str(PLATFORM), '--output', str(folder)]) == 0
+    call(main, town, '--params', PLATFORM, '--output', folder)
     found = result_of(folder)
     times, forces, rates = drive()
     motion = MotionCueing(PLATFORM).run(times, forces, rates)
@@ -72,8 +69,8 @@ def test_report_of_a_drive(town: Path, tmp_path: Path) -> None:
     assert found['felt_of_wanted']['surge']['correlation'] > 0.4
     page = (folder / 'report.html').read_text(encoding='utf-8')
     assert page.count('<svg') == 13 and 'nan' not in page.lower().replace('nance', '')
-    assert capability(['--params', str(PLATFORM), '--motion', str(folder / 'motion'),
-                       '--output', str(tmp_path / 'datasheet')]) == 0
+    call(capability, '--params', PLATFORM, '--motion', folder / 'motion', '--output',
+         tmp_path / 'datasheet')
     datasheet = json.loads((tmp_path / 'datasheet' / 'datasheet.json').read_bytes())
     assert datasheet['motion']['possible'] and datasheet['motion']['samples'] == len(times)
 
@@ -82,8 +79,7 @@ def test_report_of_a_drive(town: Path, tmp_path: Path) -> None:
 def test_tuned_gains_use_the_machine(town: Path, tmp_path: Path) -> None:
     """90 % of a limit, and no more; each gain has its reason; the file has them."""
     folder = tmp_path / 'out'
-    assert main([str(town), '--params', str(PLATFORM), '--output', str(folder), '--tune',
-                 '--no-report']) == 0
+    call(main, town, '--params', PLATFORM, '--output', folder, '--tune', '--no-report')
     found = result_of(folder)
     assert 0.88 < max(found['largest_use'].values()) <= 0.9 + 1e-6
     assert len(found['tuned']) == 8
@@ -153,19 +149,18 @@ def test_units_are_those_of_other_recordings(tmp_path: Path) -> None:
     't,ax,ay,az\n0,1,2,3\n1,1,x,3\n',
     't,ax,ay,az\n0,1,2,3\n1,1,2\n',
     't,ax,ay,az\n0,1,2,inf\n1,1,2,3\n'], ids=count())
-def test_bad_file_is_named(tmp_path: Path, text: str, capsys: Any, snapshot: Snapshot) -> None:
+def test_bad_file_is_named(tmp_path: Path, text: str, snapshot: Snapshot) -> None:
     """Exit code 2, one line, and nothing is written."""
     path = tmp_path / 'motion.csv'
     path.write_text(text, encoding='utf-8')
     with snapshot.raises(StewartError):
         read_vehicle(path, None)
-    assert main([str(path), '--params', str(PLATFORM), '--output', str(tmp_path / 'out')]) == 2
-    said = capsys.readouterr().err
+    said = call(main, path, '--params', PLATFORM, '--output', tmp_path / 'out', code=2).err
     assert said.count('\n') == 1
     assert not (tmp_path / 'out').exists()
 
 
-def test_strict_ends_with_1_where_limits_hold_back(tmp_path: Path, capsys: Any) -> None:
+def test_strict_ends_with_1_where_limits_hold_back(tmp_path: Path) -> None:
     """And a possible error in the recording is a warning."""
     times, forces, rates = drive()
     path = tmp_path / 'wild.csv'
@@ -174,30 +169,29 @@ def test_strict_ends_with_1_where_limits_hold_back(tmp_path: Path, capsys: Any) 
                header='t,ax [g],ay [g],az [g]')
     arguments = [str(path), '--params', str(PLATFORM), '--output', str(tmp_path / 'out'),
                  '--no-report']
-    assert main([*arguments, '--strict']) == 1
+    call(main, *arguments, '--strict', code=1)
     assert result_of(tmp_path / 'out')['held_back_s']
-    assert main(arguments) == 2  # results exist
+    call(main, *arguments, code=2)  # results exist
     np.savetxt(path, np.column_stack([times, forces / GRAVITY]), delimiter=',', comments='',
                header='t,ax,ay,az')
-    assert main([*arguments, '--force']) == 0
-    assert 'in g, must be in m/s^2' in capsys.readouterr().err
+    assert 'in g, must be in m/s^2' in call(main, *arguments, '--force').err
 
 
 @pytest.mark.parametrize('wrong', [True, False])
 def test_gains_are_not_proposed_from_a_recording_with_a_possible_error(
-        tmp_path: Path, wrong: bool, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, wrong: bool) -> None:
     """A vehicle in motion from the first sample on, without gravity."""
     times = np.arange(0.0, 30.0, 1.0 / 60.0)
     rows = np.column_stack([
         times, 2.0 * np.sin(0.8 * times), 3.0 * np.sin(0.5 * times),
         GRAVITY * (not wrong) + 0.5 * np.sin(3.0 * times)])
     np.savetxt(tmp_path / 'drive.csv', rows, delimiter=',', header='t,ax,ay,az', comments='')
-    code = main([str(tmp_path / 'drive.csv'), '--params', str(PLATFORM), '--tune', '--strict',
-                 '--no-report', '--output', str(tmp_path / 'out')])
+    err = call(main, tmp_path / 'drive.csv', '--params', PLATFORM, '--tune', '--strict',
+               '--no-report', '--output', tmp_path / 'out', code=int(wrong)).err
     found = result_of(tmp_path / 'out')
-    assert code == int(wrong) and bool(found['tuned']) != wrong
+    assert bool(found['tuned']) != wrong
     assert ('without gravity' in found['likely_mistake']) == wrong
-    assert ('no gains are proposed' in capsys.readouterr().err) == wrong
+    assert ('no gains are proposed' in err) == wrong
 
 
 @pytest.mark.parametrize('times, text', [

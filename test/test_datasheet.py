@@ -13,16 +13,15 @@ import math
 from pathlib import Path
 import re
 import shutil
-import subprocess
 import sys
 from typing import Any
 from urllib.parse import unquote
 
 import messages
 import numpy as np
+from programs import call, run_program
 import pytest
 from referees import random_direction, rng, rotation_about
-from rosbags.rosbag2 import StoragePlugin, Writer
 
 from snapshot import Snapshot
 from stewart_dynamics import (
@@ -43,7 +42,7 @@ from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.mechanics.parameter_errors import find_option_errors
 from stewart_dynamics.replay import main as replay
 from stewart_dynamics.replay.recorded_motion import read_motion, RecordedMotion
-from stewart_dynamics.replay.replay_options import NODE, Options
+from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.block_statistics import finite
 from stewart_dynamics.reporting.vector_picture import hull, ticks
 
@@ -56,20 +55,15 @@ PIVOT = np.array([0.05, -0.1, 0.3])
 BROWSER = shutil.which('chromium') or shutil.which('chromium-browser')
 
 
-def run(*arguments: Any) -> int:
-    """Return the exit code for these arguments."""
-    return main([str(each) for each in arguments])
-
-
 @pytest.fixture(scope='module')
 def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a datasheet with everything in it."""
     folder = tmp_path_factory.mktemp('capability')
     box = folder / 'box.yaml'
     box.write_text('x: 0.1\ny: [-0.1, 0.1]\nrx: 0.2\n')
-    assert run('--params', PLATFORM, '--pivot', *PIVOT, '--payload', 40, 0, 0, 0.2, '--box', box,
-               '--motion', ROOT / 'bags' / 'clear', '--leg-stiffness', 5e7,
-               '--output', folder / 'sheet', '--strict') == 0
+    call(main, '--params', PLATFORM, '--pivot', *PIVOT, '--payload', 40, 0, 0, 0.2, '--box', box,
+         '--motion', ROOT / 'bags' / 'clear', '--leg-stiffness', 5e7, '--output', folder / 'sheet',
+         '--strict')
     return folder / 'sheet'
 
 
@@ -219,20 +213,18 @@ DRIVEN = PARAMETERS.replaced({
     ({'drive.torque_speed': [0.0, 0.3, 600.0, 0.2]}, 'drive.torque_speed'),
     ({'limits.force_max': 100.0}, 'limits.force_max')])
 def test_a_pose_that_cannot_be_held_has_no_datasheet(
-        changes: dict[str, Any], limit: str, tmp_path: Path,
-        capsys: pytest.CaptureFixture[str]) -> None:
+        changes: dict[str, Any], limit: str, tmp_path: Path) -> None:
     DRIVEN.replaced(changes).to_yaml(tmp_path / 'weak.yaml')
-    assert run('--params', tmp_path / 'weak.yaml', '--output', tmp_path / 'sheet') == 2
-    said = capsys.readouterr().err
+    said = call(main, '--params', tmp_path / 'weak.yaml', '--output', tmp_path / 'sheet',
+                code=2).err
     assert re.search(rf'pose: leg_\d: .* above {limit}$', said, re.MULTILINE), said
     assert not (tmp_path / 'sheet').exists()
 
 
-def test_the_payloads_of_peak_and_continuous_torque_are_named(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_payloads_of_peak_and_continuous_torque_are_named(tmp_path: Path) -> None:
     DRIVEN.to_yaml(tmp_path / 'a.yaml')
-    assert run('--params', tmp_path / 'a.yaml', '--pivot', *PIVOT,
-               '--output', tmp_path / 'sheet') == 0
+    printed = call(main, '--params', tmp_path / 'a.yaml', '--pivot', *PIVOT, '--output',
+                   tmp_path / 'sheet').out
     sheet = json.loads((tmp_path / 'sheet' / 'datasheet.json').read_text())
     assert sheet['payload']['limit'] == 'torque_max'
     assert sheet['payload']['continuous']['limit'] == 'torque_continuous'
@@ -240,7 +232,7 @@ def test_the_payloads_of_peak_and_continuous_torque_are_named(
     home = StewartPlatform(DRIVEN).home_pose().position
     assert sheet['pose']['position'] == home.tolist()
     assert sheet['pose']['pivot_position'] == (home + PIVOT).tolist()
-    printed, page = capsys.readouterr().out, (tmp_path / 'sheet' / 'datasheet.html').read_text()
+    page = (tmp_path / 'sheet' / 'datasheet.html').read_text()
     for text in ('continuous torque of a motor', 'torque of a motor'):
         assert text in printed and text in page
     assert all(each in page for each in DRIVEN.drives)
@@ -311,14 +303,9 @@ def test_the_motion_between_setpoints_is_judged_where_it_is_known(
 
 
 def test_poses_far_out_of_range_are_counted_as_rejected(tmp_path: Path) -> None:
-    bag = tmp_path / 'bag'
-    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        poses = writer.add_connection(f'{NODE}/setpoint/pose', messages.POSE,
-                                      typestore=messages.STORE)
-        for n in range(100):
-            stamp = 1_000_000_000 + n * 10_000_000
-            writer.write(poses, stamp, messages.pose(
-                stamp, (0.0, 0.0, 1e10 if n == 50 else 1.1)))
+    bag = messages.write_bag(tmp_path / 'bag', (
+        ('setpoint/pose', stamp, messages.pose(stamp, (0.0, 0.0, 1e10 if n == 50 else 1.1)))
+        for n in range(100) for stamp in [messages.SECOND + 10 * n * messages.MS]))
     found = read_motion(bag, PARAMETERS, Options(cutoff=5.0), lambda size: None)
     assert (len(found.seconds), found.rejected) == (99, 1)
 
@@ -365,52 +352,38 @@ def test_without_a_limit_of_its_speed_a_motion_is_possible_and_can_be_larger(
     snapshot(motion_verdict(found))
 
 
-def test_a_bag_through_a_singularity_is_not_possible(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bag_through_a_singularity_is_not_possible(tmp_path: Path) -> None:
     given = '--params', PLATFORM, '--motion', ROOT / 'bags' / 'singular', '--output'
-    assert run(*given, tmp_path / 'a', '--strict') == 1
-    printed = capsys.readouterr()
+    printed = call(main, *given, tmp_path / 'a', '--strict', code=1)
     assert 'motion not possible: at no speed, by singularity at 8.22' in printed.out
     assert f'results: {tmp_path / "a"}' in printed.out
 
 
 def heaving_bag(folder: Path, factor: float = 1.0, twist: float = 0.0) -> Path:
     """Write a bag of poses times a factor, with twists times a factor, without accelerations."""
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections = [writer.add_connection(
-            f'{NODE}/~/setpoint/{name}'.replace('/~', ''), f'geometry_msgs/msg/{kind}Stamped',
-            typestore=messages.STORE) for name, kind in (
-                ('pose', 'Pose'), ('twist', 'Twist'), ('accel', 'Accel'))]
-        for n in range(600):
-            stamp = messages.NOW + round(n * 1e7)
-            height = 1.1 + 0.05 * math.sin(0.03 * n)
-            rate = 0.15 * math.cos(0.03 * n)
-            for connection, data in zip(connections, (
-                    messages.pose(stamp, [0.0, 0.0, factor * height]),
-                    messages.twist(stamp, [0.0, 0.0, twist * rate, 0.0, 0.0, 0.0]),
-                    messages.accel(stamp)), strict=True):
-                writer.write(connection, stamp, data)
-    return folder
+    phase = 0.03 * np.arange(600)[:, None]
+    up = np.array([0.0, 0.0, 1.0])
+    return messages.write_bag(folder, messages.setpoints(
+        messages.NOW + 10 * messages.MS * np.arange(600), Motion(
+            factor * (1.1 + 0.05 * np.sin(phase)) * up, np.eye(3),
+            twist * 0.15 * np.cos(phase) * up)))
 
 
-def test_a_motion_in_millimetres_is_named_before_its_twists(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_motion_in_millimetres_is_named_before_its_twists(tmp_path: Path) -> None:
     bag = heaving_bag(tmp_path / 'bag', 1e3, twist=1.0)
-    assert run('--params', PLATFORM, '--motion', bag, '--output', tmp_path / 'a',
-               '--strict') == 1
-    printed = ' '.join(capsys.readouterr().out.split())
+    out = call(main, '--params', PLATFORM, '--motion', bag, '--output', tmp_path / 'a', '--strict',
+               code=1).out
+    printed = ' '.join(out.split())
     assert ('motion not judged, its messages contradict each other or the parameters: '
             'setpoint/pose: first setpoint: possible error: position in mm; ') in printed
     assert printed.count('possible error') == 1
     assert 'velocity is not the derivative of the poses' in printed
 
 
-def test_a_motion_whose_twists_are_zero_is_not_judged(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_motion_whose_twists_are_zero_is_not_judged(tmp_path: Path) -> None:
     heaving_bag(tmp_path / 'bag')
-    assert run('--params', PLATFORM, '--motion', tmp_path / 'bag',
-               '--output', tmp_path / 'a', '--strict') == 1
-    printed = capsys.readouterr().out
+    printed = call(main, '--params', PLATFORM, '--motion', tmp_path / 'bag', '--output',
+                   tmp_path / 'a', '--strict', code=1).out
     assert 'motion not judged, its messages contradict each other or the parameters: ' in printed
     assert 'no limit at any speed' not in printed
     motion = json.loads((tmp_path / 'a' / 'datasheet.json').read_text())['motion']
@@ -443,7 +416,7 @@ def test_the_page_loads_nothing_and_names_are_text(tmp_path: Path) -> None:
         'joints': ['<img src=x onerror=a>', 'b"', "c'", 'd&', 'e</svg>', 'f'],
         'limits.velocity_max': 0.1, 'limits.base_joint_angle_max': 0.4})
     p.to_yaml(tmp_path / 'a.yaml')
-    assert run('--params', tmp_path / 'a.yaml', '--output', tmp_path / 'sheet') == 0
+    call(main, '--params', tmp_path / 'a.yaml', '--output', tmp_path / 'sheet')
     text = (tmp_path / 'sheet' / 'datasheet.html').read_text()
     page = _Loaded(text)
     assert not page.found
@@ -515,10 +488,9 @@ def test_right_units_in_options_are_no_possible_errors(option: str, values: Any)
 
 
 def test_a_possible_error_in_a_pose_comes_before_the_error_that_follows(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
-    assert run('--params', PLATFORM, '--output', tmp_path / 'sheet', '--pose',
-               0, 0, 1180, 0, 0, 0, '--pivot', 0, 0, 100) == 2
-    pose, pivot, error = capsys.readouterr().err.splitlines()
+        tmp_path: Path, snapshot: Snapshot) -> None:
+    pose, pivot, error = call(main, '--params', PLATFORM, '--output', tmp_path / 'sheet', '--pose',
+                              0, 0, 1180, 0, 0, 0, '--pivot', 0, 0, 100, code=2).err.splitlines()
     snapshot(pose)
     snapshot(pivot)
     snapshot(error)
@@ -540,11 +512,11 @@ BAD: list[tuple[list[str], str]] = [
 
 @pytest.mark.parametrize('arguments', BAD, ids=' '.join)
 def test_bad_input_is_exit_code_2_and_one_line(
-        arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str],
-        snapshot: Snapshot) -> None:
+        arguments: list[str], tmp_path: Path, snapshot: Snapshot) -> None:
     given = {'--params': [PLATFORM], '--output': [tmp_path / 'sheet'], arguments[0]: arguments[1:]}
-    assert run(*(text for option, values in given.items() for text in (option, *values))) == 2
-    *_, last = capsys.readouterr().err.splitlines()
+    error = call(main, *(text for option, values in given.items() for text in (option, *values)),
+                 code=2).err
+    *_, last = error.splitlines()
     assert last.startswith('stewart_capability: ')
     snapshot(last)
     assert not [*tmp_path.iterdir()]
@@ -553,34 +525,27 @@ def test_bad_input_is_exit_code_2_and_one_line(
 @pytest.mark.parametrize('arguments', [
     ('--pose', 'a', 0, 0, 0, 0, 0), ('--differentiate', 1e300), ('--differentiate', 1e-300)])
 def test_arguments_that_are_no_usable_numbers_are_rejected(
-        arguments: tuple[Any, ...], capsys: pytest.CaptureFixture[str],
-        snapshot: Snapshot) -> None:
-    with pytest.raises(SystemExit, match='2'):
-        run('--params', PLATFORM, *arguments)
-    snapshot(capsys.readouterr().err)
+        arguments: tuple[Any, ...], snapshot: Snapshot) -> None:
+    snapshot(call(main, '--params', PLATFORM, *arguments, code=2).err)
 
 
 @pytest.mark.parametrize('text', [
     'x: 0.0', 'q: 1.0', 'x: [0.1, -0.1]', 'x: [1, 2, 3]', 'x: .nan', 'x: far', '', '[]',
     'x: [-1.7e308, 1.7e308]', 'rx: 20'])
-def test_a_box_that_is_none_is_rejected(
-        text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+def test_a_box_that_is_none_is_rejected(text: str, tmp_path: Path, snapshot: Snapshot) -> None:
     (tmp_path / 'box.yaml').write_text(text)
     given = '--params', PLATFORM, '--box', tmp_path / 'box.yaml', '--output', tmp_path / 'a'
-    assert run(*given) == 2
-    snapshot(capsys.readouterr().err)
+    snapshot(call(main, *given, code=2).err)
 
 
-def test_a_box_that_is_not_reachable_names_its_worst_displacement(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_box_that_is_not_reachable_names_its_worst_displacement(tmp_path: Path) -> None:
     (tmp_path / 'box.yaml').write_text('x: [0.2, 0.8]\nry: 0.1\n')
     given = '--box', tmp_path / 'box.yaml', '--output'
-    assert run('--params', PLATFORM, *given, tmp_path / 'a', '--strict') == 1
+    printed = call(main, '--params', PLATFORM, *given, tmp_path / 'a', '--strict', code=1).out
     box = json.loads((tmp_path / 'a' / 'datasheet.json').read_text())['box']
     assert box['displacement']['x'] == pytest.approx(0.8)
     assert abs(box['displacement']['ry']) == pytest.approx(0.1)
     assert [box['displacement'][axis] for axis in ('y', 'z', 'rx', 'rz')] == [0.0] * 4
-    printed = capsys.readouterr().out
     assert f'({box["leg"]}) exceeded by {down(1e3 * box["excess"])} mm at x ' in printed
     assert '−0 ' not in printed
 
@@ -601,7 +566,7 @@ def test_the_excess_of_a_box_has_the_unit_of_its_limit(limit: str, snapshot: Sna
 
 
 def test_without_limits_there_is_no_datasheet_and_ratings_without_theirs_are_left_out(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path) -> None:
     def stripped(*kept: str) -> Path:
         values = {name: value for name, value in PARAMETERS.given.items()
                   if not name.startswith('limits.') or name in kept}
@@ -609,10 +574,10 @@ def test_without_limits_there_is_no_datasheet_and_ratings_without_theirs_are_lef
         return tmp_path / 'a.yaml'
 
     given = '--pose', 0, 0, 1.18, 0, 0, 0, '--output'
-    assert run('--params', stripped(), *given, tmp_path / 'a') == 2
-    assert 'limits.force_max' in capsys.readouterr().err
+    error = call(main, '--params', stripped(), *given, tmp_path / 'a', code=2).err
+    assert 'limits.force_max' in error
     lengths = stripped('limits.length_min', 'limits.length_max')
-    assert run('--params', lengths, *given, tmp_path / 'a') == 0
+    call(main, '--params', lengths, *given, tmp_path / 'a')
     found = json.loads((tmp_path / 'a' / 'datasheet.json').read_text())
     assert found['force'] is found['payload'] is found['velocity'] is None
     assert 'Static load' not in (tmp_path / 'a' / 'datasheet.html').read_text()
@@ -643,23 +608,20 @@ def test_report_and_datasheet_of_a_motion_link_to_each_other(tmp_path: Path) -> 
 
     bag, given = ROOT / 'bags' / 'clear', ('--params', PLATFORM)
     report = tmp_path / 'replayed' / 'clear' / 'report.html'
-    assert replay([str(each) for each in (
-        bag, *given, '--plotly', 'shared', '--output', report.parents[1])]) == 0
+    call(replay, bag, *given, '--plotly', 'shared', '--output', report.parents[1])
     assert not linked(report)
     sheet = tmp_path / 'datasheet' / 'datasheet.html'
-    assert run(*given, '--motion', bag, '--output', sheet.parent) == 0
+    call(main, *given, '--motion', bag, '--output', sheet.parent)
     assert linked(sheet) == [report]
     # not with other parameters
     other = tmp_path / 'other.yaml'
     PARAMETERS.replaced({'platform.mass': 151.0}).to_yaml(other)
     elsewhere = tmp_path / 'of_other' / 'datasheet.html'
-    assert run('--params', other, '--motion', bag, '--output', elsewhere.parent) == 0
+    call(main, '--params', other, '--motion', bag, '--output', elsewhere.parent)
     assert not linked(elsewhere)
-    assert replay([str(each) for each in (
-        bag, '--params', other, '--plotly', 'shared', '--output', tmp_path / 'b')]) == 0
+    call(replay, bag, '--params', other, '--plotly', 'shared', '--output', tmp_path / 'b')
     assert not linked(tmp_path / 'b' / 'clear' / 'report.html')
-    assert replay([str(each) for each in (
-        bag, *given, '--plotly', 'shared', '--output', report.parents[1], '--force')]) == 0
+    call(replay, bag, *given, '--plotly', 'shared', '--output', report.parents[1], '--force')
     assert linked(report) == [sheet]
 
 
@@ -676,19 +638,16 @@ def test_the_payload_of_a_base_that_turns_is_that_of_any_orientation(
         HeldPayload(None, None, 3.0, 2.0), {'base.source': source}) == payload
 
 
-def test_results_are_replaced_only_by_option(
-        sheet: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
-    assert run('--params', PLATFORM, '--output', sheet) == 2
-    snapshot(capsys.readouterr().err)
+def test_results_are_replaced_only_by_option(sheet: Path, snapshot: Snapshot) -> None:
+    snapshot(call(main, '--params', PLATFORM, '--output', sheet, code=2).err)
 
 
 def test_help_needs_no_numpy() -> None:
     code = ('import sys; from stewart_dynamics.datasheet import main\n'
             'try: main(["--help"])\n'
             'except SystemExit: print("numpy" in sys.modules)')
-    done = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, timeout=300)
-    assert done.stdout.endswith('False\n')
+    done = run_program(sys.executable, '-c', code, code=None)
+    assert done.out.endswith('False\n')
 
 
 @pytest.mark.parametrize(('value', 'text'), [
@@ -792,10 +751,9 @@ def test_a_published_hexapod_reaches_each_of_its_limits_alone_but_not_all_at_onc
         0.4173, abs=1e-4)
 
 
-def test_a_stuck_leg_is_on_the_sheet_where_it_is_asked_for(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run('--params', PLATFORM, '--stuck', 'leg_3', '--output', tmp_path / 'sheet') == 0
-    assert 'leg_3 stuck: five motions remain' in capsys.readouterr().out
+def test_a_stuck_leg_is_on_the_sheet_where_it_is_asked_for(tmp_path: Path) -> None:
+    out = call(main, '--params', PLATFORM, '--stuck', 'leg_3', '--output', tmp_path / 'sheet').out
+    assert 'leg_3 stuck: five motions remain' in out
     found = json.loads((tmp_path / 'sheet' / 'datasheet.json').read_text())['stuck_leg']
     assert found['leg'] == 'leg_3' and len(found['motions']) == 5
     c = Capability(StewartPlatform.from_yaml(PLATFORM))
@@ -808,7 +766,8 @@ def test_a_stuck_leg_is_on_the_sheet_where_it_is_asked_for(
     assert found['payload']['value'] == pytest.approx(expected.payload.value)
     page = (tmp_path / 'sheet' / 'datasheet.html').read_text()
     assert 'leg_3 stuck: five motions remain' in page
-    assert run('--params', PLATFORM, '--stuck', 'leg_7', '--output', tmp_path / 'b') == 2
-    assert capsys.readouterr().err == (
+    error = call(main, '--params', PLATFORM, '--stuck', 'leg_7', '--output', tmp_path / 'b',
+                 code=2).err
+    assert error == (
         "stewart_capability: --stuck: 'leg_7': must be one of leg_1, leg_2, leg_3, leg_4, leg_5, "
         'leg_6\n')

@@ -12,6 +12,7 @@ from typing import Any
 
 from msgspec.structs import replace
 import numpy as np
+from programs import call
 import pytest
 from referees import ROOT
 from stewart_dynamics import (
@@ -62,10 +63,10 @@ def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
         '\n'.join(','.join(f'{each!r}' for each in map(float, (
             recorded.seconds[n], *rows.position[n], 0.0, 0.0, 0.0, *rows.linear_velocity[n],
             0.0, 0.0, 0.0, *rows.linear_acceleration[n], 0.0, 0.0, 0.0))) for n in range(101))))
-    assert main([str(each) for each in (
-        '--params', FILE, '--pivot', 0, 0, 0.3, '--box', box, '--motion', recording,
-        '--leg-stiffness', 2e4, '--stuck', 'leg_3', '--torque-unit', 'kgcm', '--output',
-        folder / 'sheet', '--strict')]) == 0
+    call(main, *[str(each) for each in ('--params', FILE, '--pivot', 0, 0, 0.3, '--box', box,
+                                        '--motion', recording, '--leg-stiffness', 2e4, '--stuck',
+                                        'leg_3', '--torque-unit', 'kgcm', '--output',
+                                        folder / 'sheet', '--strict')])
     return folder / 'sheet'
 
 
@@ -123,7 +124,7 @@ def test_the_page_has_angles_levers_and_torques(sheet: Path, figures: dict[str, 
 
 
 def test_torques_are_in_newton_metres_by_default(tmp_path: Path) -> None:
-    assert main(['--params', str(FILE), '--output', str(tmp_path / 'sheet')]) == 0
+    call(main, '--params', FILE, '--output', tmp_path / 'sheet')
     text = re.sub(r'<[^>]+>', ' ', (tmp_path / 'sheet' / 'datasheet.html').read_text())
     assert 'torque at rest [N m]' in text
     assert 'largest angle' in text and 'smallest angle' in text
@@ -173,13 +174,12 @@ def test_a_motion_past_a_limit_of_poses_is_possible_at_no_speed(
     ([0.0, 0.0, 1.2], ReachError, 'cannot reach'),
     ([0.0, 0.0, 0.85], PoseError, 'limits.angle_max')])
 def test_a_pose_that_cannot_be_held_has_no_datasheet(
-        pose: list[float], error: type[Exception], words: str, tmp_path: Path,
-        capsys: pytest.CaptureFixture[str]) -> None:
+        pose: list[float], error: type[Exception], words: str, tmp_path: Path) -> None:
     with pytest.raises(error, match=words):
         RatedHexapod(PARAMETERS, Pose(pose, np.eye(3)))
-    assert main(['--params', str(FILE), '--pose', *map(str, pose), '0', '0', '0',
-                 '--output', str(tmp_path / 'sheet')]) == 2
-    assert words in capsys.readouterr().err.splitlines()[-1]
+    error = call(main, '--params', FILE, '--pose', *pose, '0', '0', '0', '--output',
+                 tmp_path / 'sheet', code=2).err
+    assert words in error.splitlines()[-1]
 
 
 def test_natural_frequencies_are_those_with_held_motors() -> None:

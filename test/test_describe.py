@@ -5,11 +5,11 @@
 """The command stewart_describe: its files, messages and exit codes."""
 
 from pathlib import Path
-import subprocess
 import sys
 from xml.etree import ElementTree as ET
 
 import numpy as np
+from programs import call, run_program
 import pytest
 
 from stewart_dynamics import Parameters
@@ -21,69 +21,61 @@ PROGRAM = 'stewart_describe'
 PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
 
 
-def run(*arguments):
-    """Return the exit code for these arguments."""
-    return main([str(each) for each in arguments])
-
-
-def test_all_files_are_written_and_nothing_is_said(tmp_path, capsys):
-    assert run('--params', PLATFORM, '--output', tmp_path) == 0
+def test_all_files_are_written_and_nothing_is_said(tmp_path):
+    printed = call(main, '--params', PLATFORM, '--output', tmp_path)
     names = ['platform.urdf', 'platform.sdf', 'platform.xml', 'platform.svg',
              'platform_loops.yaml', 'platform_scene.xml']
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
-    printed = capsys.readouterr()
     assert printed.out.split() == [str(tmp_path / name) for name in names]
     assert printed.err == ''
 
 
-def test_existing_files_are_kept_unless_replacement_is_requested(tmp_path, capsys, snapshot):
+def test_existing_files_are_kept_unless_replacement_is_requested(tmp_path, snapshot):
     (tmp_path / 'a.sdf').write_text('mine')
     given = '--params', PLATFORM, '--output', tmp_path, '--name', 'a'
-    assert run(*given) == 2
+    snapshot(call(main, *given, code=2).err)
     assert [path.name for path in tmp_path.iterdir()] == ['a.sdf']
-    snapshot(capsys.readouterr().err)
-    assert run(*given, '--force') == 0
+    call(main, *given, '--force')
     assert (tmp_path / 'a.sdf').read_text() != 'mine'
 
 
 def test_the_parameters_are_those_of_a_node_by_its_name(tmp_path):
     stacked = PLATFORM.with_name('stacked.yaml')
-    assert run('--params', stacked, '--node', 'upper_hexapod', '--output', tmp_path) == 0
+    call(main, '--params', stacked, '--node', 'upper_hexapod', '--output', tmp_path)
     assert '<link name="stage">' in (tmp_path / 'stacked.urdf').read_text()
-    assert run('--params', stacked, '--output', tmp_path, '--force') == 2
+    call(main, '--params', stacked, '--output', tmp_path, '--force', code=2)
 
 
 @pytest.mark.parametrize('kind', ['urdf', 'sdf', 'xml'])
-def test_each_file_is_read_into_a_parameter_file_that_the_node_takes(kind, tmp_path, capsys):
+def test_each_file_is_read_into_a_parameter_file_that_the_node_takes(kind, tmp_path):
     if kind == 'xml':
         pytest.importorskip('mujoco')
-    run('--params', PLATFORM, '--output', tmp_path)
-    assert run('--from', tmp_path / f'platform.{kind}', '--output', tmp_path / 'read') == 0
+    printed = call(main, '--params', PLATFORM, '--output', tmp_path).err
+    printed += call(main, '--from', tmp_path / f'platform.{kind}', '--output',
+                    tmp_path / 'read').err
     read = Parameters.from_yaml(tmp_path / 'read' / 'platform.yaml')
     assert read['limits.velocity_max'] == pytest.approx([0.5] * 6)
-    assert capsys.readouterr().err == ''
+    assert printed == ''
 
 
-def test_possible_errors_are_warnings_and_exit_code_1_with_strict(tmp_path, capsys, snapshot):
+def test_possible_errors_are_warnings_and_exit_code_1_with_strict(tmp_path, snapshot):
     p = Parameters.from_yaml(PLATFORM)
     joints = p['geometry.base_joints'].copy()
     joints[0, 1] *= -1.0
     p.replaced({'geometry.base_joints': joints}).to_yaml(tmp_path / 'wrong.yaml')
     given = '--params', tmp_path / 'wrong.yaml', '--output', tmp_path
-    assert run(*given) == 0
-    snapshot(capsys.readouterr().err)
-    assert run(*given, '--force', '--strict') == 1
-    assert run('--from', tmp_path / 'wrong.sdf', '--output', tmp_path / 'read', '--strict') == 1
+    snapshot(call(main, *given).err)
+    call(main, *given, '--force', '--strict', code=1)
+    call(main, '--from', tmp_path / 'wrong.sdf', '--output', tmp_path / 'read', '--strict', code=1)
 
 
-def test_zero_gravity_of_a_file_is_said_once(tmp_path, capsys, snapshot):
+def test_zero_gravity_of_a_file_is_said_once(tmp_path, snapshot):
     pytest.importorskip('mujoco')
     Parameters.from_yaml(PLATFORM).replaced({'gravity': [0.0, 0.0, 0.0]}).to_yaml(
         tmp_path / 'orbit.yaml')
-    assert run('--params', tmp_path / 'orbit.yaml', '--output', tmp_path) == 0
-    capsys.readouterr()
-    assert run('--from', tmp_path / 'orbit.xml', '--output', tmp_path / 'read') == 0
-    (said,) = [line for line in capsys.readouterr().err.splitlines() if 'gravity' in line]
+    call(main, '--params', tmp_path / 'orbit.yaml', '--output', tmp_path)
+    error = call(main, '--from', tmp_path / 'orbit.xml', '--output', tmp_path / 'read').err
+    (said,) = [line for line in error.splitlines() if 'gravity' in line]
     snapshot(said)
 
 
@@ -93,8 +85,8 @@ def test_zero_gravity_of_a_file_is_said_once(tmp_path, capsys, snapshot):
 @pytest.mark.parametrize('interfaces', ['effort', 'velocity', 'position,effort', 'position'])
 def test_the_block_of_ros2_control_is_written_by_option(tmp_path, hardware, plugin, interfaces):
     """Hardware over topics publishes each command, not only those that differ from the state."""
-    run('--params', PLATFORM, '--output', tmp_path, '--ros2-control', interfaces,
-        '--hardware', hardware)
+    call(main, '--params', PLATFORM, '--output', tmp_path, '--ros2-control', interfaces,
+         '--hardware', hardware)
     block = ET.parse(tmp_path / 'platform.urdf').find('ros2_control')
     assert block.findtext('hardware/plugin') == plugin
     assert len(block.findall('joint/command_interface')) == 6 * len(interfaces.split(','))
@@ -106,9 +98,8 @@ def test_the_block_of_ros2_control_is_written_by_option(tmp_path, hardware, plug
 @pytest.mark.parametrize('arguments', [
     ['--params', 'none.yaml'], ['--from', 'none.urdf'], ['--from', str(PLATFORM)],
     ['--from', 'none.urdf', '--ros2-control', 'effort']])
-def test_bad_input_is_exit_code_2_and_one_line(arguments, tmp_path, capsys, snapshot):
-    assert run(*arguments, '--output', tmp_path) == 2
-    printed = capsys.readouterr()
+def test_bad_input_is_exit_code_2_and_one_line(arguments, tmp_path, snapshot):
+    printed = call(main, *arguments, '--output', tmp_path, code=2)
     assert printed.err.startswith('stewart_describe: ')
     snapshot(printed.err)
     assert printed.err.count('\n') == 1
@@ -118,55 +109,50 @@ def test_bad_input_is_exit_code_2_and_one_line(arguments, tmp_path, capsys, snap
 @pytest.mark.parametrize('arguments', [
     [], ['--params', 'a', '--from', 'b'], ['--params', 'a', '--name', 'a/b'],
     ['--params', 'a', '--ros2-control', 'torque']])
-def test_wrong_arguments_are_explained(arguments, capsys):
-    with pytest.raises(SystemExit) as ended:
-        run(*arguments)
-    assert ended.value.code == 2
-    assert 'usage: stewart_describe' in capsys.readouterr().err
+def test_wrong_arguments_are_explained(arguments):
+    assert 'usage: stewart_describe' in call(main, *arguments, code=2).err
 
 
 def test_help_needs_no_numpy():
     code = ('import sys; from stewart_dynamics.description import main\n'
             'try: main(["--help"])\n'
             'except SystemExit: print("numpy" in sys.modules)')
-    done = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, timeout=300)
-    assert done.stdout.endswith('False\n')
+    assert run_program(sys.executable, '-c', code).out.endswith('False\n')
 
 
 def test_joints_on_circles_are_written_as_points(tmp_path):
     on_circles = tmp_path / 'circles.yaml'
     ON_CIRCLES.to_yaml(on_circles)
-    assert run('--params', on_circles, '--output', tmp_path) == 0
+    call(main, '--params', on_circles, '--output', tmp_path)
     written = Parameters.from_yaml(tmp_path / 'circles_points.yaml')
     assert written == ON_CIRCLES.with_points()
     text = (tmp_path / 'circles_points.yaml').read_text()
     assert not any(each in text for each in ('_radius', '_angles', '_height'))
     assert 'geometry.base_joints' in written.given
-    assert run('--from', tmp_path / 'circles.urdf', '--output', tmp_path / 'read') == 0
+    call(main, '--from', tmp_path / 'circles.urdf', '--output', tmp_path / 'read')
     read = Parameters.from_yaml(tmp_path / 'read' / 'circles.yaml')
     assert np.array_equal(read['geometry.base_joints'], written['geometry.base_joints'])
 
 
-def test_a_description_is_read_back_in_its_own_folder(tmp_path, capsys):
+def test_a_description_is_read_back_in_its_own_folder(tmp_path):
     """The picture that is there already needs no --force, but another one is not replaced."""
-    assert run('--params', PLATFORM, '--output', tmp_path) == 0
-    assert run('--from', tmp_path / 'platform.urdf', '--output', tmp_path) == 0
+    call(main, '--params', PLATFORM, '--output', tmp_path)
+    call(main, '--from', tmp_path / 'platform.urdf', '--output', tmp_path)
     assert Parameters.from_yaml(tmp_path / 'platform.yaml')
     (tmp_path / 'platform.yaml').unlink()
     (tmp_path / 'platform.svg').write_text('<svg>of mine</svg>')
-    assert run('--from', tmp_path / 'platform.urdf', '--output', tmp_path) == 2
-    assert 'platform.svg: exists; --force replaces it' in capsys.readouterr().err
+    error = call(main, '--from', tmp_path / 'platform.urdf', '--output', tmp_path, code=2).err
+    assert 'platform.svg: exists; --force replaces it' in error
     assert not (tmp_path / 'platform.yaml').exists()
     assert (tmp_path / 'platform.svg').read_text() == '<svg>of mine</svg>'
 
 
 @pytest.mark.parametrize('source', ['params', 'from'])
 def test_a_picture_shows_all_joints_with_the_numbers_of_their_legs(source, tmp_path):
-    run('--params', PLATFORM, '--output', tmp_path)
+    call(main, '--params', PLATFORM, '--output', tmp_path)
     picture = tmp_path / 'platform.svg'
     if source == 'from':
-        run('--from', tmp_path / 'platform.urdf', '--output', tmp_path / 'read')
+        call(main, '--from', tmp_path / 'platform.urdf', '--output', tmp_path / 'read')
         picture = tmp_path / 'read' / 'platform.svg'
     tree = ET.parse(picture)
     texts = [each.text for each in tree.iter('{http://www.w3.org/2000/svg}text')]

@@ -11,6 +11,7 @@ from typing import Any
 
 from independent_hexapod import moving
 import numpy as np
+from programs import call
 import pytest
 from referees import rng, ROOT
 from snapshot import Snapshot
@@ -172,29 +173,18 @@ def test_a_center_beyond_a_limit_is_named(snapshot: Snapshot) -> None:
 
 
 def test_a_center_in_degrees_or_millimetres_is_a_possible_error(
-        capsys: pytest.CaptureFixture[str], tmp_path: Path, snapshot: Snapshot) -> None:
-    code, _, err = run(capsys, *QUICK, '--output', tmp_path / 'out', '--center',
-                       0, 0, 990, 5, 0, 0)
-    assert code == 2
-    snapshot(err)
+        tmp_path: Path, snapshot: Snapshot) -> None:
+    snapshot(call(main, *QUICK, '--output', tmp_path / 'out', '--center', 0, 0, 990, 5, 0, 0,
+                  code=2).err)
 
 
-def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    """Return exit code, stdout and stderr of stewart_identify --design in this process."""
-    code = main(['--design', *map(str, arguments)])
-    out, err = capsys.readouterr()
-    return code, out, err
-
-
-QUICK = ('--params', PLATFORM, '--generations', 3, '--harmonics', 2, '--duration', 8,
+QUICK = ('--design', '--params', PLATFORM, '--generations', 3, '--harmonics', 2, '--duration', 8,
          '--identify', 'platform,friction')
 
 
-def test_the_file_is_for_stewart_trajectory(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_file_is_for_stewart_trajectory(tmp_path: Path) -> None:
     folder = tmp_path / 'designed'
-    code, out, err = run(capsys, *QUICK, '--output', folder)
-    assert code == 0
+    _, out, err = call(main, *QUICK, '--output', folder)
     assert err.startswith('stewart_identify: designing a motion of 8 s in 3 generations')
     trajectory = ReferenceMotionParameters.from_yaml(folder / 'trajectory.yaml')
     assert (trajectory['motion.type'], trajectory['motion.duration']) == ('fourier', 8.0)
@@ -207,16 +197,13 @@ def test_the_file_is_for_stewart_trajectory(
     head = (folder / 'trajectory.yaml').read_text(encoding='utf-8')
     assert head.startswith('# Designed to identify platform, friction, seed 0.')
     # Existing files are not replaced without --force.
-    code, out, err = run(capsys, *QUICK, '--output', folder)
-    assert code == 2 and str(folder) in err and not out
-    assert run(capsys, *QUICK, '--output', folder, '--force')[0] == 0
+    _, out, err = call(main, *QUICK, '--output', folder, code=2)
+    assert str(folder) in err and not out
+    call(main, *QUICK, '--output', folder, '--force')
 
 
-def test_a_motion_may_be_designed_for_the_tilt_as_well(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = tmp_path / 'designed'
-    code, out, _ = run(capsys, *QUICK[:-1], 'platform,friction,tilt', '--output', folder)
-    assert code == 0
+def test_a_motion_may_be_designed_for_the_tilt_as_well(tmp_path: Path) -> None:
+    out = call(main, *QUICK[:-1], 'platform,friction,tilt', '--output', tmp_path / 'designed').out
     half_widths = {words[0]: (float(words[2]), words[3]) for words in (
         line.split() for line in out.splitlines()[1:15])}
     for axis in 'xy':
@@ -226,12 +213,11 @@ def test_a_motion_may_be_designed_for_the_tilt_as_well(
 
 @pytest.mark.parametrize('arguments', [
     (*QUICK, '--highest-frequency', 20), (*QUICK[:-1], 'cylinder,piston'),
-    ('--params', 'missing.yaml')])
+    ('--design', '--params', 'missing.yaml')])
 def test_a_failed_design_is_reported_in_one_line(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: Any,
-        snapshot: Snapshot) -> None:
-    code, out, err = run(capsys, *arguments, '--output', tmp_path / 'designed')
-    assert (code, out) == (2, '')
+        tmp_path: Path, arguments: Any, snapshot: Snapshot) -> None:
+    _, out, err = call(main, *arguments, '--output', tmp_path / 'designed', code=2)
+    assert out == ''
     *progress, line = err.splitlines()
     assert all(each.startswith('stewart_identify: design') for each in progress)
     snapshot(line)
@@ -242,9 +228,5 @@ def test_a_failed_design_is_reported_in_one_line(
     ('--params', 'x', '--design', 'a_bag'), ('--params', 'x'),
     ('--params', 'x', '--design', '--duration', '0'),
     ('--params', 'x', '--design', '--harmonics', '2.5')])
-def test_arguments_that_do_not_fit_are_named(
-        capsys: pytest.CaptureFixture[str], arguments: Any, snapshot: Snapshot) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(list(arguments))
-    assert ended.value.code == 2
-    snapshot(capsys.readouterr().err)
+def test_arguments_that_do_not_fit_are_named(arguments: Any, snapshot: Snapshot) -> None:
+    snapshot(call(main, *arguments, code=2).err)

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from programs import call
 import pytest
 from referees import random_motion, rng, ROOT
 from snapshot import Snapshot
@@ -358,12 +359,12 @@ def test_a_direction_is_one_or_minus_one(snapshot: Snapshot) -> None:
 def test_stewart_export_writes_them_on_request(tmp_path: Path) -> None:
     DRIVEN.to_yaml(tmp_path / 'hexapod.yaml')
     given = ['--params', str(tmp_path / 'hexapod.yaml'), '--output', str(tmp_path / 'c')]
-    assert main([*given, '--drives']) == 0
+    call(main, *given, '--drives')
     page = (tmp_path / 'c' / 'hexapod_drives.md').read_text()
     assert '| leg_2 | -1 | 600 | -6.291456e+08 | 3.413 |' in page
     assert f'| {1e3 / (2.0 * math.pi * GEAR / LEAD):.6g} |' in page
     assert (tmp_path / 'c' / 'hexapod_ethercat_6.yaml').exists()
-    assert main([*given[:-1], str(tmp_path / 'd')]) == 0
+    call(main, *given[:-1], tmp_path / 'd')
     assert not list((tmp_path / 'd').glob('*drives*'))
 
 

@@ -11,7 +11,6 @@ import json
 import math
 from pathlib import Path
 import signal
-import subprocess
 import time
 from typing import Any
 
@@ -19,13 +18,14 @@ from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
 from lifecycle_msgs.msg import Transition
 import numpy as np
+from programs import call, run_program
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter as RosParameter
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 from running import (
-    assert_only_log_lines, bits, DEADLINE, DynamicsNode, ERROR, executable, HOME, LATCHED,
+    assert_only_log_lines, bits, DEADLINE, DynamicsNode, ERROR, HOME, LATCHED,
     log_lines, MOVING, nanoseconds, NODE, NodeProcess, NOT_JOINED, OK, OUTPUTS, participants, Peer,
     PLATFORM, raw, rejected, ROOT, Sample, says, SEPARATE, STALE, wrench_message)
 from std_msgs.msg import Bool
@@ -47,8 +47,7 @@ LEAPING = Sample(accel=(0.0, 0.0, 100.0, 0.0, 0.0, 0.0))
 
 def _replayed(bag: str, folder: Path) -> list[tuple[int, str, bytes]]:
     """Return the output of the replay of a bag: time of recording, topic, message."""
-    assert replay([str(ROOT / 'bags' / bag), '--params', str(PLATFORM), '--output', str(folder),
-                   '--no-report']) == 0
+    call(replay, ROOT / 'bags' / bag, '--params', PLATFORM, '--output', folder, '--no-report')
     return _recorded(folder / bag / 'bag')
 
 
@@ -688,7 +687,5 @@ def test_for_any_input_only_finite_numbers_are_published_and_a_setpoint_is_answe
 
 
 def test_a_stray_argument_is_rejected() -> None:
-    ended = subprocess.run([executable('stewart_dynamics'), 'foo'], capture_output=True, text=True,
-                           check=False)
-    assert ended.returncode == 1
-    assert ended.stderr == 'stewart_dynamics: foo: unknown argument; see --help\n'
+    ended = run_program('stewart_dynamics', 'foo', code=1)
+    assert ended.err == 'stewart_dynamics: foo: unknown argument; see --help\n'

@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 
+from programs import run_program
 import pytest
 
 pytest.importorskip('rclpy')
@@ -28,8 +28,6 @@ rclpy_workarounds.shut_down(None, Hanging())
 
 @pytest.mark.ros
 def test_a_process_whose_end_hangs_is_ended_with_a_traceback() -> None:
-    done = subprocess.run(
-        [sys.executable, '-c', HANGS], capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 1
-    assert 'in destroy_node' in done.stderr
-    assert 'in shut_down' in done.stderr
+    done = run_program(sys.executable, '-c', HANGS, code=1)
+    assert 'in destroy_node' in done.err
+    assert 'in shut_down' in done.err

@@ -21,6 +21,7 @@ from checked_results import state_record
 from crank_machines import random_machine, random_state
 from crank_platforms import base_of, motion_of, parameters_of
 import numpy as np
+from programs import call, run_program
 import pytest
 from referees import (
     Array, random_base_motion, random_motion, random_parameters, random_wrench, rng,
@@ -109,7 +110,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     return loaded
 
 
-def call(function: Any, count: int, *arguments: Any) -> None:
+def compute(function: Any, count: int, *arguments: Any) -> None:
     """Call a C function with a count, and with arrays, numbers."""
     function(ctypes.c_size_t(count), *(
         ctypes.c_size_t(each) if isinstance(each, int) else ctypes.c_void_p(each.ctypes.data)
@@ -171,8 +172,8 @@ def samples(library: ctypes.CDLL) -> dict[str, Any]:
             'bases': random.normal(0.0, 3.0, (SAMPLES, BASE)),
             'given': random.integers(0, 4, SAMPLES, dtype=np.int32),
             'results': np.zeros(SAMPLES, RESULTS), 'codes': np.zeros(SAMPLES, np.int32)}
-    call(library.inverse_dynamics, SAMPLES, made['hexapods'], 1, made['motions'],
-         made['wrenches'], made['bases'], made['given'], made['results'], made['codes'])
+    compute(library.inverse_dynamics, SAMPLES, made['hexapods'], 1, made['motions'],
+            made['wrenches'], made['bases'], made['given'], made['results'], made['codes'])
     return made
 
 
@@ -213,8 +214,8 @@ def test_cranks_have_the_bits_of_the_library(library: ctypes.CDLL, seed: int) ->
     results, codes = np.zeros(count, RESULTS), np.zeros(count, np.int32)
     motions[0, 2] += 100.0  # out of reach
     hexapods = np.repeat(platform.structure, count)
-    call(library.inverse_dynamics, count, hexapods, 1, motions, wrenches, bases, given, results,
-         codes)
+    compute(library.inverse_dynamics, count, hexapods, 1, motions, wrenches, bases, given, results,
+            codes)
     expected = platform.solve(
         motions, np.where(given[:, None] & HAS_WRENCH, wrenches, 0.0),
         np.where(given[:, None] & HAS_BASE, bases, np.nan))
@@ -231,7 +232,7 @@ def test_forward_kinematics_have_the_bits_of_the_library(
     guesses[:, 3:12] = (turns @ guesses[:, 3:12].reshape(-1, 3, 3)).reshape(SAMPLES, 9)
     lengths = np.ascontiguousarray(samples['results']['moving'][:, LENGTHS])
     poses, codes = np.ascontiguousarray(guesses[:, :12]), np.zeros(SAMPLES, np.int32)
-    call(library.forward_kinematics, SAMPLES, samples['hexapods'], lengths, poses, codes)
+    compute(library.forward_kinematics, SAMPLES, samples['hexapods'], lengths, poses, codes)
 
     steps, residuals, outcomes = np.empty(1, int), np.empty(1), np.empty(SAMPLES, int)
     for n in range(SAMPLES):
@@ -306,8 +307,8 @@ def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
         stamps = np.cumsum(random.choice([10_000_000, 2_000_000, -5_000_000], count))
         states, outputs = np.zeros(count, STATE), np.zeros(count, OUTPUT)
         motors, codes = np.zeros(count, MOTORS), np.zeros((2, count), np.int32)
-        call(library.steps, count, structure(p), motions, wrenches, bases, given, stamps, states,
-             outputs, codes[0], motors, codes[1])
+        compute(library.steps, count, structure(p), motions, wrenches, bases, given, stamps,
+                states, outputs, codes[0], motors, codes[1])
 
         step, state, drives = Step(p), FIRST, Drives(p)
         results = np.zeros((count, RESULT))
@@ -356,7 +357,7 @@ def test_rotations_of_quaternions_are_those_of_the_node(library: ctypes.CDLL) ->
     quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
     quaternions *= rng(1).uniform(0.99901, 1.00099, (1000, 1))
     found, codes = np.empty((1000, 9)), np.empty(1000, np.int32)
-    call(library.rotations, 1000, quaternions, found, codes)
+    compute(library.rotations, 1000, quaternions, found, codes)
     length = quaternion_length(*quaternions.T)
     assert not codes.any()
     np.testing.assert_array_equal(found, np.stack(from_quaternion(*quaternions.T / length), 1))
@@ -366,7 +367,7 @@ def test_rotations_of_quaternions_are_those_of_the_node(library: ctypes.CDLL) ->
 def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with the files of the example hexapod."""
     folder = tmp_path_factory.mktemp('exported')
-    assert main(['--params', str(PLATFORM_FILE), '--output', str(folder)]) == 0
+    call(main, '--params', PLATFORM_FILE, '--output', folder)
     return folder
 
 
@@ -396,8 +397,8 @@ def test_golden_vectors_are_met_and_nothing_warns(
         # Also of cranks the bits: this is the library that computed them.
         made = compile_c(tmp_path, *language, '-O2', '-DTOLERANCE=0.0', *WARNINGS,
                          *folder.glob('*.c'), '-x', 'none', compiler=compiler)
-        done = subprocess.run([made], capture_output=True, text=True)
-        assert (done.returncode, done.stdout) == (0, f'{text} golden vectors, 0 differences\n')
+        done = run_program(made)
+        assert done.out == f'{text} golden vectors, 0 differences\n'
 
 
 @needs_compiler
@@ -414,9 +415,8 @@ def test_golden_vectors_of_other_cranks_differ(
     other = line.replace(last, (1.001 * float.fromhex(last)).hex())
     source.write_text(source.read_text().replace(line, other, 1))
     made = compile_c(tmp_path, '-std=c99', *source.parent.glob('*.c'))
-    done = subprocess.run([made], capture_output=True, text=True)
-    assert done.returncode == 1
-    assert f': {quantity}[0] is ' in done.stdout
+    done = run_program(made, code=1)
+    assert f': {quantity}[0] is ' in done.out
 
 
 def test_golden_vectors_of_cranks_are_read_as_they_were_computed(exported_cranks: Path) -> None:
@@ -529,10 +529,10 @@ def test_servos_out_of_range_or_not_measured_get_no_pulses(snapshot: Snapshot) -
     for path in CRANK_FILE, PLATFORM_FILE:
         with snapshot.raises(ParameterError):
             StewartPlatform(Parameters.from_yaml(path)).servo_pulses([0.0] * 6)
-    call, pulses = function('stewart_servo_pulses'), np.full(6, -1.0)
+    fill, pulses = function('stewart_servo_pulses'), np.full(6, -1.0)
     hexapod = rig.structure
     for angles, code in (([0.0] * 5 + [1.11], 13), ([0.0] * 5 + [math.nan], 2)):
-        assert call(hexapod, np.array(angles), pulses) == code
+        assert fill(hexapod, np.array(angles), pulses) == code
         assert pulses.tolist() == [-1.0] * 6
 
 
@@ -560,9 +560,8 @@ def test_golden_vectors_are_not_met_by_another_hexapod(exported: Path, tmp_path:
     assert text.count(f'  {mass},  /* platform.mass: 150 kg */') == 1
     source.write_text(text.replace(mass, float.hex(math.nextafter(150.0, 200.0))))
     made = compile_c(tmp_path, '-std=c99', *source.parent.glob('*.c'))
-    done = subprocess.run([made], capture_output=True, text=True)
-    assert done.returncode == 1
-    assert 'vector 0: demanded_force[0] is ' in done.stdout
+    done = run_program(made, code=1)
+    assert 'vector 0: demanded_force[0] is ' in done.out
 
 
 @needs_compiler
@@ -596,10 +595,8 @@ def test_32_bit_targets_compile(exported: Path, tmp_path: Path) -> None:
                            text=True, capture_output=True)
     if probe.returncode:
         pytest.skip('the compiler has no 32-bit target')
-    done = subprocess.run(
-        [COMPILERS[0], *options, '-std=c99', *WARNINGS, *map(str, exported.glob('*.c'))],
-        capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, '')
+    assert not run_program(
+        COMPILERS[0], *options, '-std=c99', *WARNINGS, *exported.glob('*.c')).err
 
 
 @pytest.mark.skipif('gcc' not in COMPILERS, reason='needs gcc')
@@ -635,11 +632,9 @@ def test_stack_is_bounded_and_nothing_recurses(tmp_path: Path, level: str) -> No
 
 @pytest.mark.skipif(not shutil.which('cppcheck'), reason='needs cppcheck')
 def test_cppcheck_finds_nothing(exported: Path) -> None:
-    done = subprocess.run(
-        ['cppcheck', '--quiet', '--std=c99', '--inconclusive', '--error-exitcode=1',
-         '--enable=warning,style,performance,portability', *map(str, exported.glob('*.c'))],
-        capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, '')
+    assert not run_program(
+        'cppcheck', '--quiet', '--std=c99', '--inconclusive', '--error-exitcode=1',
+        '--enable=warning,style,performance,portability', *exported.glob('*.c')).err
 
 
 def test_the_source_is_short_and_needs_math_alone() -> None:
@@ -670,15 +665,11 @@ def test_cmake_builds_tests_and_installs(exported: Path, tmp_path: Path) -> None
     if not any(map(shutil.which, ('c++', 'g++', 'clang++'))):
         pytest.skip('needs a C++ compiler')
 
-    def run(*arguments: str | Path) -> None:
-        done = subprocess.run([str(each) for each in arguments], capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
-
-    run(cmake, '-S', exported, '-B', tmp_path / 'build',
-        f'-DCMAKE_INSTALL_PREFIX={tmp_path / "installed"}')
-    run(cmake, '--build', tmp_path / 'build')
-    run(Path(cmake).with_name('ctest'), '--test-dir', tmp_path / 'build')
-    run(cmake, '--install', tmp_path / 'build')
+    run_program(cmake, '-S', exported, '-B', tmp_path / 'build',
+                f'-DCMAKE_INSTALL_PREFIX={tmp_path / "installed"}')
+    run_program(cmake, '--build', tmp_path / 'build')
+    run_program(Path(cmake).with_name('ctest'), '--test-dir', tmp_path / 'build')
+    run_program(cmake, '--install', tmp_path / 'build')
 
     user = tmp_path / 'user'
     user.mkdir()
@@ -687,9 +678,9 @@ def test_cmake_builds_tests_and_installs(exported: Path, tmp_path: Path) -> None
     (user / 'CMakeLists.txt').write_text(
         'cmake_minimum_required(VERSION 3.15)\nproject(user CXX)\nfind_package(hexapod REQUIRED)\n'
         'add_executable(user main.cpp)\ntarget_link_libraries(user hexapod::hexapod)\n')
-    run(cmake, '-S', user, '-B', user, f'-DCMAKE_PREFIX_PATH={tmp_path / "installed"}')
-    run(cmake, '--build', user)
-    run(user / 'user')
+    run_program(cmake, '-S', user, '-B', user, f'-DCMAKE_PREFIX_PATH={tmp_path / "installed"}')
+    run_program(cmake, '--build', user)
+    run_program(user / 'user')
 
 
 def test_golden_csv_is_read_as_it_was_computed(exported: Path) -> None:
@@ -714,17 +705,10 @@ def test_golden_csv_is_read_as_it_was_computed(exported: Path) -> None:
 
 # Files and command line
 
-def run(*arguments: object) -> int:
-    """Return the exit code for these arguments."""
-    return main([str(each) for each in arguments])
-
-
-def test_files_are_the_same_in_every_run(
-        exported: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run('--params', PLATFORM_FILE, '--output', tmp_path / 'new') == 0
+def test_files_are_the_same_in_every_run(exported: Path, tmp_path: Path) -> None:
+    printed = call(main, '--params', PLATFORM_FILE, '--output', tmp_path / 'new')
     names = ['stewart_dynamics.h', 'stewart_dynamics.c', 'hexapod.h', 'hexapod.c', 'golden.csv',
              'test_golden.c', 'CMakeLists.txt']
-    printed = capsys.readouterr()
     assert printed.out.split() == [str(tmp_path / 'new' / name) for name in names]
     assert printed.err == ''
     for name in names:
@@ -737,55 +721,50 @@ def test_files_are_the_same_in_every_run(
 
 
 def test_existing_files_are_kept_unless_replacement_is_requested(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+        tmp_path: Path, snapshot: Snapshot) -> None:
     (tmp_path / 'rig.c').write_text('mine')
     given = '--params', PLATFORM_FILE, '--output', tmp_path, '--name', 'rig'
-    assert run(*given) == 2
+    snapshot(call(main, *given, code=2).err)
     assert [path.name for path in tmp_path.iterdir()] == ['rig.c']
-    snapshot(capsys.readouterr().err)
-    assert run(*given, '--force') == 0
+    call(main, *given, '--force')
     assert 'const stewart_platform rig = {' in (tmp_path / 'rig.c').read_text()
 
 
 @pytest.mark.parametrize('name', [
     '', '2nd', 'a b', '_reserved', 'int', 'class', 'sqrt', 'stewart_dynamics', 'Stewart_Export',
     'test_golden', 'all', 'NULL', 'linux', 'größe', '../hexapod', 'a' * 64])
-def test_names_that_c_cannot_have(
-        name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run('--params', PLATFORM_FILE, '--output', tmp_path, '--name', name) == 2
-    error = capsys.readouterr().err
+def test_names_that_c_cannot_have(name: str, tmp_path: Path) -> None:
+    error = call(main, '--params', PLATFORM_FILE, '--output', tmp_path, '--name', name, code=2).err
     assert error.count('\n') == 1 and name[:30] in error
     assert 'must be a C identifier' in error or 'a word of C, C++ or CMake' in error
     assert not list(tmp_path.iterdir())
 
 
-def test_bad_parameters_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_parameters_are_one_line(tmp_path: Path) -> None:
     for path in tmp_path / 'missing.yaml', ROOT / 'README.md', ROOT / 'config' / 'stacked.yaml':
-        assert run('--params', path, '--output', tmp_path / 'out') == 2
-        error = capsys.readouterr().err
+        error = call(main, '--params', path, '--output', tmp_path / 'out', code=2).err
         assert error.count('\n') == 1 and str(path) in error
     assert not (tmp_path / 'out').exists()
-    assert run('--params', ROOT / 'config' / 'stacked.yaml', '--node', 'upper_hexapod',
-               '--output', tmp_path / 'out') == 0
+    call(main, '--params', ROOT / 'config' / 'stacked.yaml', '--node', 'upper_hexapod', '--output',
+         tmp_path / 'out')
 
 
 def test_a_possible_error_is_printed_before_the_error_that_follows_from_it(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+        tmp_path: Path, snapshot: Snapshot) -> None:
     path = tmp_path / 'mm.yaml'
     Parameters.from_yaml(PLATFORM_FILE).replaced({
         'limits.length_min': 950.0, 'limits.length_max': 1650.0,
         'limits.base_joint_angle_max': 0.6}).to_yaml(path)
-    assert run('--params', path, '--output', tmp_path / 'out') == 2
-    *warnings, error = capsys.readouterr().err.splitlines()
+    error = call(main, '--params', path, '--output', tmp_path / 'out', code=2).err
+    *warnings, error = error.splitlines()
     snapshot(warnings[0])
     snapshot(error)
 
 
-def test_an_output_that_is_a_file_is_one_line(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_output_that_is_a_file_is_one_line(tmp_path: Path) -> None:
     (tmp_path / 'file').touch()
-    assert run('--params', PLATFORM_FILE, '--output', tmp_path / 'file') == 2
-    assert capsys.readouterr().err.count('\n') == 1
+    error = call(main, '--params', PLATFORM_FILE, '--output', tmp_path / 'file', code=2).err
+    assert error.count('\n') == 1
 
 
 @needs_compiler

@@ -20,7 +20,6 @@ import errno
 import fcntl
 import json
 import logging
-import math
 import multiprocessing
 from multiprocessing.process import BaseProcess
 import os
@@ -42,13 +41,13 @@ from cases import few
 from distributed import Client, LocalCluster
 import messages
 import numpy as np
+from programs import run_program
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import StoragePlugin, Writer
 from snapshot import Snapshot
 
-from stewart_dynamics import BagError, Parameters, StewartError
+from stewart_dynamics import BagError, Motion, Parameters, StewartError
 from stewart_dynamics.bags.find import folders_of_results
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.bag_task import finished, kept, replay_task, STOPPED, Task
@@ -64,28 +63,15 @@ PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
 PLAIN = Options(report=False)
 SECOND = 1_000_000_000
-KINDS = {'pose': messages.pose, 'twist': messages.twist, 'accel': messages.accel}
 
 
 def heave(folder: Path, number: int, amplitude: float = 0.05) -> Path:
     """Write a bag of setpoints 1 ms apart."""
-    templates = {name: bytearray(make(SECOND)) for name, make in KINDS.items()}
-    # after the stamp, one number differs: z
-    place = {name: len(template) - 8 * (5 if name == 'pose' else 4)
-             for name, template in templates.items()}
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections = {
-            name: writer.add_connection(
-                f'{NODE}/setpoint/{name}', getattr(messages, name.upper()),
-                typestore=messages.STORE) for name in KINDS}
-        for n in range(number):
-            stamp, t = SECOND + n * 1_000_000, n * 0.001
-            z = (1.1 + amplitude * math.sin(t), amplitude * math.cos(t), -amplitude * math.sin(t))
-            for value, (name, template) in zip(z, templates.items(), strict=True):
-                struct.pack_into('<iI', template, 4, *divmod(stamp, SECOND))
-                struct.pack_into('<d', template, place[name], value)
-                writer.write(connections[name], stamp, bytes(template))
-    return folder
+    count = np.arange(number)
+    up, phase = np.array([0.0, 0.0, 1.0]), 0.001 * count[:, None]
+    sine, cosine = (amplitude * f(phase) * up for f in (np.sin, np.cos))
+    return messages.write_bag(folder, messages.setpoints(
+        SECOND + messages.MS * count, Motion(1.1 * up + sine, np.eye(3), cosine, None, -sine)))
 
 
 @pytest.fixture(scope='module')
@@ -424,10 +410,9 @@ def test_processes_that_cannot_start_are_reported_at_once(short: Path, tmp_path:
         '    replay_fleet(pairs, parameters, output, Options(), jobs=2)\n'
         'except StewartError as exc:\n'
         '    print(exc)\n', encoding='utf-8')
-    ended = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=300,
-                           check=False)
-    assert ended.stdout == 'the processes to replay bags could not start\n'
-    assert "if __name__ == '__main__':" in ended.stderr
+    ended = run_program(sys.executable, script, code=None)
+    assert ended.out == 'the processes to replay bags could not start\n'
+    assert "if __name__ == '__main__':" in ended.err
 
 
 def test_replaced_results_are_restored_if_their_replacement_is_incomplete(

@@ -17,6 +17,7 @@ from typing import Any
 import zipfile
 
 import numpy as np
+from programs import call
 import pytest
 from referees import random_base_motion, random_motion, random_wrench, rng
 from rosbags.highlevel import AnyReader
@@ -314,12 +315,11 @@ def test_flat_names_on_request(version: str, tmp_path: Path) -> None:
     assert set(done['forces_1']) == {at_home(PARAMETERS).forces[0]}
 
 
-def test_flat_names_belong_to_an_fmu(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_flat_names_belong_to_an_fmu(tmp_path: Path) -> None:
     params = str(ROOT / 'config' / 'platform.yaml')
-    with pytest.raises(SystemExit):
-        main(['--params', params, '--output', str(tmp_path), '--flat'])
-    assert '--flat: needs --fmu' in capsys.readouterr().err
-    assert main(['--params', params, '--output', str(tmp_path), '--flat', '--fmu']) == 0
+    error = call(main, '--params', params, '--output', tmp_path, '--flat', code=2).err
+    assert '--flat: needs --fmu' in error
+    call(main, '--params', params, '--output', tmp_path, '--flat', '--fmu')
     described = fmpy.read_model_description(str(tmp_path / 'hexapod.fmu'))
     assert 'forces_1' in [each.name for each in described.modelVariables]
 
@@ -431,14 +431,13 @@ def test_without_a_compiler(version: str, tmp_path: Path) -> None:
     assert (version == '3') == ('sources/buildDescription.xml' in names)
 
 
-def test_program(version: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                 capsys: pytest.CaptureFixture[str]) -> None:
+def test_program(version: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The FMU stands beside the C files; without a compiler one line says so."""
     params = str(ROOT / 'config' / 'platform.yaml')
     written = tmp_path / 'with'
     option = ['--fmu'] if version == '3' else ['--fmu', '2']
-    assert main(['--params', params, '--output', str(written), '--name', 'arm', *option]) == 0
-    assert 'no binary' not in capsys.readouterr().err
+    error = call(main, '--params', params, '--output', written, '--name', 'arm', *option).err
+    assert 'no binary' not in error
     described = fmpy.read_model_description(str(written / 'arm.fmu'))
     assert described.fmiVersion == f'{version}.0'
     assert described.coSimulation.modelIdentifier == 'arm'
@@ -446,12 +445,12 @@ def test_program(version: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     assert [Path(name).stem for name in names if name.startswith('binaries/')] == ['arm']
     monkeypatch.setenv('PATH', str(tmp_path))
     monkeypatch.delenv('CC', raising=False)
-    assert main(['--params', params, '--output', str(tmp_path), *option]) == 0
-    assert 'hexapod.fmu has no binary: no C compiler' in capsys.readouterr().err
+    error = call(main, '--params', params, '--output', tmp_path, *option).err
+    assert 'hexapod.fmu has no binary: no C compiler' in error
     monkeypatch.setenv('CC', shutil.which('false', path='/bin:/usr/bin') or 'false')
     failed = tmp_path / 'failed'
-    assert main(['--params', params, '--output', str(failed), *option]) == 2
-    assert 'cannot compile the FMU' in capsys.readouterr().err
+    error = call(main, '--params', params, '--output', failed, *option, code=2).err
+    assert 'cannot compile the FMU' in error
     assert not failed.exists()
 
 

@@ -8,15 +8,14 @@ from __future__ import annotations
 from typing import Any
 
 from governed import (
-    CRANK_DEMANDS, CRANK_KINDS, CRANKS, DEMANDS, KINDS, limited_cranks, limited_hexapod,
-    random_demand, stops)
+    CRANK_DEMANDS, CRANK_KINDS, CRANKS, DEMANDS, governable, KINDS, limited_cranks,
+    limited_hexapod, random_demand, stops)
 from independent_cranks import cranks
 from independent_limits import exceedances
 import numpy as np
 import pytest
 from referees import PLATFORM
 from stewart_dynamics import GovernedStream, Motion, Parameters, StewartPlatform
-from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 
 # Times of a stop by its rate, the last ones at rest.
@@ -36,13 +35,7 @@ def demanded(values: Any) -> Motion:
 def test_each_setpoint_is_within_the_limits(kind: str, wanted: str) -> None:
     """One kind of limit, and all together, of random hexapods."""
     random = np.random.default_rng([KINDS.index(kind), DEMANDS.index(wanted)])
-    while True:
-        p, axes = limited_hexapod(random, kind)
-        try:
-            stream = GovernedStream(p)
-            break
-        except ParameterError:  # home is not within such limits
-            continue
+    p, axes, stream = governable(random, kind, limited_hexapod)
     times, demand = random_demand(random, wanted, p, 400)
     motion = stream.advance(times, demand)
     assert {name for name, wrong in exceedances(p, motion, axes).items() if wrong.any()} == set()
@@ -57,13 +50,7 @@ def test_each_setpoint_of_cranks_has_a_stop_within_the_limits(kind: str) -> None
     """20,000 setpoints of all kinds of demand; the stops are computed apart, and sampled."""
     random, checked = np.random.default_rng([1, CRANK_KINDS.index(kind)]), 0
     for wanted in CRANK_DEMANDS:
-        while True:
-            try:
-                p, axes = limited_cranks(random, kind)
-                stream = GovernedStream(p)
-                break
-            except ParameterError:  # home is not within such limits
-                continue
+        p, axes, stream = governable(random, kind, limited_cranks)
         times, demand = random_demand(random, wanted, p, 150)
         motion = stream.advance(times, demand)
         for each in (motion, stops(p, motion[::15], stream.stop_rate, PARTS)):

@@ -15,6 +15,7 @@ from typing import Any, TYPE_CHECKING
 from cases import few
 import numpy as np
 from numpy.typing import NDArray
+from programs import call
 import pytest
 from recorded import about, at_rest, fourier, MotionAt, Noise, Recorded, recorded, write_bag
 from referees import rng, ROOT, rotation_about
@@ -60,18 +61,16 @@ def motions() -> dict[str, Recorded]:
 
 
 @pytest.fixture
-def identified(motions: dict[str, Recorded], tmp_path: Path,
-               capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
+def identified(motions: dict[str, Recorded], tmp_path: Path) -> Callable[..., Any]:
     """Return a function that identifies from a recording; it returns code, document, output."""
     def run(name: str, *options: str, change: Change = lambda given: given,
-            params: Path = FILE) -> tuple[int, Any, str, str]:
+            params: Path = FILE) -> tuple[object, Any, str, str]:
         bag = tmp_path / 'a bag'
         if not bag.exists():
             write_bag(bag, change(motions[name]), GIVEN['joints'])
-        code = main([str(bag), '--params', str(params), '--output', str(tmp_path / 'found'),
-                     *options])
+        code, out, err = call(main, bag, '--params', params, '--output', tmp_path / 'found',
+                              *options, code=None)
         path = tmp_path / 'found' / 'identification.json'
-        out, err = capsys.readouterr()
         return code, json.loads(path.read_text()) if path.exists() else None, out, err
 
     return run
@@ -365,12 +364,10 @@ def test_efforts_of_motors_need_the_drive(
         assert 'likely actuator.screw_lead, 0.04 m, is wrong: about 0.0' in err
 
 
-def test_a_table_is_rejected_with_the_way_to_a_bag(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_is_rejected_with_the_way_to_a_bag(tmp_path: Path) -> None:
     table = tmp_path / 'legs.csv'
     table.write_text('t,leg_1,effort_1\n0,0,0\n')
-    assert main([str(table), '--params', str(FILE), '--output', str(tmp_path / 'found')]) == 2
-    err = capsys.readouterr().err
+    err = call(main, table, '--params', FILE, '--output', tmp_path / 'found', code=2).err
     assert 'legs.csv: a table: measured legs are read from bags' in err
     assert 'docs/identify_from_bags.md' in err
 

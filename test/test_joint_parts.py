@@ -10,11 +10,11 @@ import json
 from pathlib import Path
 import pickle
 
+from messages import setpoints, write_bag
 import numpy as np
+from programs import call
 import pytest
 from referees import PLATFORM, rng
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_typestore, Stores
 from snapshot import Snapshot
 
 from stewart_dynamics import Motion, StewartPlatform
@@ -25,7 +25,6 @@ from stewart_dynamics.external_wrench.measured_legs import MeasuredLegs
 from stewart_dynamics.identification import main as identify
 from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, JointStateWriter
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.replay.read_arrays import read_legs
 from stewart_dynamics.replay.replay_command_line import main as replay
 from test_recorded_efforts import joined
@@ -177,34 +176,16 @@ def bag(folder: Path, split: Sequence[Sequence[int]], one_topic: bool) -> list[s
     """Write a bag of setpoints and measured legs in parts; return the topics of the legs."""
     count = 2400
     motion = motion_at(np.arange(count) * PERIOD * 1e-9)
-    types = get_typestore(Stores.ROS2_JAZZY)
     noise = rng(3).normal(size=(3, count, 6)) * np.array([1e-6, 1e-4, 2.0])[:, None, None]
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        topics = ['/legs'] * len(split) if one_topic else [
-            f'/leg_{n}/joint_states' for n in range(len(split))]
-        of_legs = {name: writer.add_connection(name, 'sensor_msgs/msg/JointState', typestore=types)
-                   for name in dict.fromkeys(topics)}
-        for name, kind, rows in (
-                ('pose', 'PoseStamped', np.hstack([motion.position, motion.quaternion])),
-                ('twist', 'TwistStamped', np.hstack([
-                    motion.linear_velocity, motion.angular_velocity])),
-                ('accel', 'AccelStamped', np.hstack([
-                    motion.linear_acceleration, motion.angular_acceleration]))):
-            connection = writer.add_connection(
-                f'/stewart_dynamics/setpoint/{name}', f'geometry_msgs/msg/{kind}', typestore=types)
-            stamped = StampedWriter('base', rows.shape[1])
-            for k, row in enumerate(rows):
-                stamp = BEGIN + k * PERIOD
-                writer.write(connection, stamp, stamped.write(stamp, row))
-        for stamp, n, data in parts(legs(count) + noise, split):
-            writer.write(of_legs[topics[n]], stamp, data)
+    topics = ['/legs'] * len(split) if one_topic else [
+        f'/leg_{n}/joint_states' for n in range(len(split))]
+    write_bag(folder, [*setpoints(BEGIN + PERIOD * np.arange(count), motion), *(
+        (topics[n], stamp, data) for stamp, n, data in parts(legs(count) + noise, split))])
     return topics
 
 
 @pytest.mark.parametrize('one_topic', [True, False])
-def test_programs_read_legs_in_parts(
-        one_topic: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str],
-        snapshot: Snapshot) -> None:
+def test_programs_read_legs_in_parts(one_topic: bool, tmp_path: Path, snapshot: Snapshot) -> None:
     whole, split = tmp_path / 'whole', tmp_path / 'split'
     bag(whole, [range(6)], True)
     topics = ','.join(dict.fromkeys(bag(split, SPLITS['one each'], one_topic)))
@@ -212,8 +193,8 @@ def test_programs_read_legs_in_parts(
     for path, measured in ((whole, '/legs'), (split, topics)):
         output = tmp_path / 'results' / path.name
         common = [str(path), '--params', str(PLATFORM), '--measured', measured, '--no-report']
-        assert replay([*common, '--output', str(output / 'r')]) == 0
-        assert identify([*common, '--output', str(output / 'i')]) == 0
+        call(replay, *common, '--output', output / 'r')
+        call(identify, *common, '--output', output / 'i')
         summary = json.loads((output / 'r' / path.name / 'summary.json').read_text())['measured']
         result = json.loads((output / 'i' / 'identification.json').read_text())
         states = read_legs(path, HEXAPOD, topic=measured)
@@ -224,9 +205,7 @@ def test_programs_read_legs_in_parts(
     assert [each['value'] for each in numbers] == [each['value'] for each in parameters]
     np.testing.assert_array_equal(other_states.positions, states.positions)
     np.testing.assert_array_equal(other_states.efforts, states.efforts)
-    capsys.readouterr()
     if not one_topic:  # without a word which
-        assert identify([str(split), '--params', str(PLATFORM), '--no-report']) == 2
-        snapshot(capsys.readouterr().err)
+        snapshot(call(identify, split, '--params', PLATFORM, '--no-report', code=2).err)
         with snapshot.raises(BagError):
             read_legs(split, HEXAPOD, topic=','.join(topics.split(',')[:5]))

@@ -13,6 +13,7 @@ import re
 import subprocess
 import sys
 
+from programs import run_program
 import pytest
 from referees import ROOT
 
@@ -46,9 +47,8 @@ def test_the_version_is_that_of_the_package() -> None:
     version = re.search(r'<version>(.*)</version>', manifest)
     assert version
     assert stewart_dynamics.__version__ == version[1]
-    done = subprocess.run([sys.executable, 'setup.py', '--version'], cwd=ROOT,
-                          capture_output=True, text=True, check=True)
-    assert done.stdout.split()[-1] == version[1]
+    done = run_program(sys.executable, 'setup.py', '--version', folder=ROOT)
+    assert done.out.split()[-1] == version[1]
 
 
 def test_a_parameter_file_is_checked_without_ros_and_bags() -> None:

@@ -16,6 +16,7 @@ import re
 from typing import Any
 
 import numpy as np
+from programs import call
 import pytest
 from referees import Array, random_motion, rng, ROOT
 from snapshot import Snapshot
@@ -126,5 +127,5 @@ def test_a_home_far_from_c_0_and_several_leads_are_rejected(snapshot: Snapshot) 
 
 def test_stewart_export_writes_them_on_request(tmp_path: Path) -> None:
     given = ['--params', str(ROOT / 'config' / 'platform.yaml'), '--output', str(tmp_path)]
-    assert main([*given, '--linuxcnc', '--name', 'rig']) == 0
+    call(main, *given, '--linuxcnc', '--name', 'rig')
     assert (tmp_path / 'rig_linuxcnc.hal').read_text() == hal_lines(EXAMPLE)

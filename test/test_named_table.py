@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from programs import call
 import pytest
 from referees import ROOT
 from snapshot import Snapshot
@@ -123,11 +124,9 @@ def test_columns_that_are_not_there(
 
 
 @pytest.mark.parametrize('option', ['x', 'x=', '=x', 'x=a,x=b', ''])
-def test_an_option_that_names_no_columns(
-        option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        replay(['a.csv', '--params', str(PARAMS), '--columns', option])
-    assert 'must be a name, = and a heading' in capsys.readouterr().err
+def test_an_option_that_names_no_columns(option: str, tmp_path: Path) -> None:
+    error = call(replay, 'a.csv', '--params', PARAMS, '--columns', option, code=2).err
+    assert 'must be a name, = and a heading' in error
 
 
 def test_a_row_with_an_empty_cell_is_a_lost_sample(tmp_path: Path) -> None:
@@ -181,12 +180,9 @@ def test_times_in_ms_without_a_unit_are_noticed(tmp_path: Path, snapshot: Snapsh
     assert table.times()[1] == 0.01 and not table.notices
 
 
-def test_all_programs_take_the_same_options(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_programs_take_the_same_options() -> None:
     for program in (replay, capability, calibrate, report):
-        with pytest.raises(SystemExit):
-            program(['--help'])
-        text = capsys.readouterr().out
+        text = call(program, '--help').out
         assert all(option in text for option in ('--columns', '--axes', '--euler', '--child'))
 
 

@@ -10,6 +10,7 @@ import shutil
 import subprocess
 
 import numpy as np
+from programs import call, run_program
 import pytest
 from referees import ROOT
 from stewart_dynamics import Motion, Parameters, StewartPlatform
@@ -23,13 +24,12 @@ def test_a_driver_gets_in(tmp_path: Path) -> None:
     file = ROOT / 'config' / 'platform.yaml'
     for each in (ROOT / 'demo' / 'octave').iterdir():
         shutil.copy(each, tmp_path)
-    assert main(['--params', str(file), '--output', str(tmp_path / 'exported')]) == 0
+    call(main, '--params', file, '--output', tmp_path / 'exported')
     subprocess.run([
         'mkoctfile', '--mex', '-DHEXAPOD=hexapod', '-Iexported',
         'stewart_forces.c', 'exported/hexapod.c', 'exported/stewart_dynamics.c'],
         cwd=tmp_path, check=True, capture_output=True)
-    done = subprocess.run(['octave-cli', '--quiet', 'driver_gets_in.m'], cwd=tmp_path, check=True,
-                          capture_output=True, text=True)
+    done = run_program('octave-cli', '--quiet', 'driver_gets_in.m', folder=tmp_path)
     lengths, empty, laden, codes = (
         [float(each) for each in line.split()] for line in done.stdout.splitlines())
     parameters = Parameters.from_yaml(file)
@@ -42,8 +42,6 @@ def test_a_driver_gets_in(tmp_path: Path) -> None:
         assert forces == result.forces.tolist()
         assert lengths == result.lengths.tolist()
     assert codes == [0.0, 0.0]
-    wrong = subprocess.run(
-        ['octave-cli', '--quiet', '--eval', 'stewart_forces([0, 0], eye(3), [], [])'],
-        cwd=tmp_path, check=False, capture_output=True, text=True)
-    assert wrong.returncode == 1
-    assert 'position: must be 3 real doubles' in wrong.stderr
+    wrong = run_program('octave-cli', '--quiet', '--eval',
+                        'stewart_forces([0, 0], eye(3), [], [])', code=1, folder=tmp_path)
+    assert 'position: must be 3 real doubles' in wrong.err

@@ -10,11 +10,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+from messages import write_bag
 import numpy as np
+from programs import call
 import pytest
 from referees import rng, ROOT
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 from scipy.spatial.transform import Rotation
 from snapshot import Snapshot
@@ -84,12 +85,10 @@ TYPES: dict[str, tuple[str, Message]] = {
 
 
 def write(folder: Path, topics: dict[str, tuple[str, Message]]) -> Path:
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        for topic, (kind, message) in topics.items():
-            to = bag.add_connection(topic, kind, typestore=STORE)
-            for n, stamp in enumerate(STAMPS.tolist()):
-                bag.write(to, stamp, STORE.serialize_cdr(message(n), kind))
-    return folder
+    return write_bag(folder, (
+        (topic, stamp, STORE.serialize_cdr(message(n), kind))
+        for topic, (kind, message) in topics.items() for n, stamp in enumerate(STAMPS.tolist())),
+        **{topic[1:]: kind for topic, (kind, _) in topics.items()})
 
 
 def check(found: Any) -> None:
@@ -120,16 +119,15 @@ def test_a_pose_stamped_comes_before_other_types(tmp_path: Path, snapshot: Snaps
         read_setpoints(bag)
 
 
-def test_the_child_of_transforms_is_selected(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_child_of_transforms_is_selected(tmp_path: Path) -> None:
     bag = write(tmp_path / 'bag', {'/tf': (
         'tf2_msgs/msg/TFMessage', lambda n: transforms(n, 'hexapod'))})
     plain = [str(bag), '--params', str(PARAMS), '--output', str(tmp_path / 'r'), '--no-report',
              '--differentiate', '--pose', '/tf']
-    assert replay(plain) == 2
+    error = call(replay, *plain, code=2).err
     assert ('no transform has the child frame platform; there are a, camera_1, hexapod: select '
-            'one by --child') in capsys.readouterr().err
-    assert replay([*plain, '--child', 'hexapod']) == 0
+            'one by --child') in error
+    call(replay, *plain, '--child', 'hexapod')
     summary = json.loads((tmp_path / 'r' / 'bag' / 'summary.json').read_text())
     assert summary['setpoints']['answered'] == COUNT and not summary['rejected']
 
@@ -146,11 +144,10 @@ def test_transforms_in_another_frame_are_rejected_and_counted(
 def test_damaged_messages_are_malformed(name: str, tmp_path: Path, snapshot: Snapshot) -> None:
     kind, message = TYPES[name]
     whole = bytes(STORE.serialize_cdr(message(0), kind))
-    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        to = bag.add_connection('/poses', kind, typestore=STORE)
-        for n in range(len(whole)):  # cut anywhere
-            bag.write(to, int(STAMPS[0]) + n, whole[:n])
-        bag.write(to, int(STAMPS[0]) + len(whole), bytes([7]) + whole[1:])
+    cut = [whole[:n] for n in range(len(whole))]  # anywhere
+    write_bag(tmp_path / 'bag', (
+        ('/poses', int(STAMPS[0]) + n, data)
+        for n, data in enumerate([*cut, bytes([7]) + whole[1:]])), poses=kind)
     with snapshot.raises(BagError):
         found = read_setpoints(tmp_path / 'bag', topics={'pose': '/poses'})
         # A message that was cut behind its pose is complete.
@@ -189,5 +186,4 @@ def test_poses_in_other_axes_are_turned(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('axes', ['x,y', 'x,y,x', 'x,y,w', '', 'xyz', 'x;y;z'])
 def test_axes_that_are_none_are_rejected(axes: str, tmp_path: Path) -> None:
-    with pytest.raises(SystemExit, match='2'):
-        replay([str(tmp_path), '--params', str(PARAMS), '--axes', axes])
+    call(replay, tmp_path, '--params', PARAMS, '--axes', axes, code=2)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from programs import call
 import pytest
 from referees import ROOT
 from stewart_dynamics import Motion, Parameters, StewartPlatform
@@ -100,13 +101,12 @@ def test_a_possible_motion_has_no_changes(recorded: RecordedMotion) -> None:
     assert judged(platform, recorded, uses(platform, recorded)).possible_with == []
 
 
-def test_terminal_and_page_say_with_which_changes_a_motion_is_possible(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_terminal_and_page_say_with_which_changes_a_motion_is_possible(tmp_path: Path) -> None:
     FILE.replaced(CASES['longer legs'][0]).to_yaml(tmp_path / 'file.yaml')
-    assert main(['--params', str(tmp_path / 'file.yaml'), '--motion', str(BAG), '--output',
-                 str(tmp_path / 'out'), '--strict']) == 1
+    out = call(main, '--params', tmp_path / 'file.yaml', '--motion', BAG, '--output',
+               tmp_path / 'out', '--strict', code=1).out
     words = 'possible at 9 % of its amplitude, or from 93 mm higher'
-    assert words in ' '.join(capsys.readouterr().out.split())
+    assert words in ' '.join(out.split())
     assert words in (tmp_path / 'out' / 'datasheet.html').read_text()
 
 

@@ -15,6 +15,7 @@ import subprocess
 import sys
 from typing import TextIO
 
+from programs import run_program
 import pytest
 from referees import ROOT
 
@@ -127,12 +128,10 @@ def test_the_end_of_the_terminal_is_an_interrupt_but_not_under_nohup() -> None:
 @pytest.mark.parametrize('module', ['ros.console_scripts', *(
     'calibration', 'datasheet', 'description', 'export', 'identification', 'replay')])
 def test_signals_are_handled_before_anything_large_is_imported(module: str) -> None:
-    done = subprocess.run(
-        [sys.executable, '-I', '-c',
-         f'import stewart_dynamics.{module}, sys; print(*sys.modules)'],
-        capture_output=True, text=True, timeout=300, check=True)
+    done = run_program(sys.executable, '-I', '-c',
+                       f'import stewart_dynamics.{module}, sys; print(*sys.modules)')
     assert not {'argparse', 'numpy', 'yaml', 'threading', 'stewart_dynamics.program'} & set(
-        done.stdout.split())
+        done.out.split())
 
 
 @pytest.mark.parametrize('kind', [number, frequency, between(-1.0, 1.0), share(0.5), whole(1, 9)])

@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 
 import jsonschema
 import numpy as np
+from programs import run_program
 import pytest
 from referees import ROOT
 from snapshot import Snapshot
@@ -208,8 +209,8 @@ def test_help_needs_no_numpy() -> None:
     code = ('import sys; from stewart_dynamics.questions import main\n'
             'try: main(["--help"])\n'
             'except SystemExit: print("numpy" in sys.modules)')
-    done = subprocess.run(['python3', '-c', code], capture_output=True, text=True, timeout=300)
-    assert done.stdout.endswith('False\n')
+    done = run_program('python3', '-c', code, code=None)
+    assert done.out.endswith('False\n')
 
 
 def test_an_answer_without_numbers_is_asked_again(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 
 from legs_of_all_kinds import random_hexapod
 import numpy as np
+from programs import call
 import pytest
 from referees import ROOT, rotation_about
 from snapshot import Snapshot
@@ -196,7 +197,7 @@ def test_the_picture_shows_the_direction_of_positive_angles(
             'geometry.crank_directions': RIG['geometry.crank_directions']})
     path = tmp_path / 'rig.yaml'
     given.to_yaml(path)
-    assert main(['--params', str(path), '--output', str(tmp_path)]) == 0
+    call(main, '--params', path, '--output', tmp_path)
     tree = ET.parse(tmp_path / 'rig.svg')
     circles = list(tree.iter(f'{SVG}circle'))
     rings = [each for each in circles if each.get('r') == '5.0']

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from io import BytesIO
 import os
 from pathlib import Path
@@ -33,7 +34,7 @@ import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 from rosbags.typesys import get_typestore, Stores
 from snapshot import Snapshot
 from stewart_dynamics import BagError, Parameters
@@ -630,19 +631,7 @@ def test_random_records_never_raise(
 
 # sqlite3
 
-def write_bag(folder: Path, of: Iterable[Recorded], plugin: StoragePlugin = StoragePlugin.SQLITE3,
-              mode: CompressionMode = CompressionMode.NONE) -> Path:
-    """Write a rosbag2 by rosbags."""
-    writer = Writer(folder, version=9, storage_plugin=plugin)
-    if mode is not CompressionMode.NONE:
-        writer.set_compression(mode, CompressionFormat.ZSTD)
-    with writer:
-        connections: dict[str, Any] = {}
-        for topic, when, data in of:
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, TYPES[topic], typestore=STORE)
-            writer.write(connections[topic], when, data)
-    return folder
+write_bag = partial(messages.write_bag, plugin=StoragePlugin.SQLITE3)
 
 
 def storage(folder: Path) -> Path:
@@ -990,7 +979,7 @@ def test_paths_that_are_not_files(tmp_path: Path, snapshot: Snapshot) -> None:
 @pytest.mark.parametrize('plugin', list(StoragePlugin))
 def test_bags_compressed_message_by_message(plugin: StoragePlugin, tmp_path: Path) -> None:
     given_ = motion(50)
-    bag = write_bag(tmp_path / 'bag', given_, plugin, CompressionMode.MESSAGE)
+    bag = messages.write_bag(tmp_path / 'bag', given_, plugin=plugin, mode=CompressionMode.MESSAGE)
     with AnyReader([bag]) as reader:
         assert [(of.topic, when, bytes(data)) for of, when, data in reader.messages()] == given_
     for path in (bag, storage(bag)):

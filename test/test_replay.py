@@ -26,13 +26,15 @@ from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from mcap_ros2.decoder import DecoderFactory
 import messages
-from messages import motion, MS, RECORDED, Recorded, SECOND, STORE, UPRIGHT
+from messages import (
+    JOINT_STATE, motion, MS, RECORDED, Recorded, SECOND, STORE, UPRIGHT, write_bag)
 import numpy as np
+from programs import call, Ended, run_program
 import pyarrow.parquet
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import StoragePlugin
 from scipy.spatial.transform import Rotation
 
 from snapshot import Snapshot
@@ -66,8 +68,6 @@ PARAMETERS = Parameters.from_yaml(PARAMS)
 PLATFORM = StewartPlatform(PARAMETERS)
 BAGS = ('clear', 'singular', 'flawed')
 TOPICS = (POSE, TWIST, ACCEL)
-JOINT_STATE = 'sensor_msgs/msg/JointState'
-KINDS = {topic.rpartition('/')[2]: kind for topic, kind in INPUT_TYPES.items()}
 
 Rejected = Callable[..., str]
 
@@ -86,11 +86,11 @@ def arguments(bag: Path, folder: Path, *options: str, params: Path = PARAMS) -> 
     return [str(bag), *options, '--params', str(params), '--output', str(folder)]
 
 
-def run(bag: Path, folder: Path, *options: str, params: Path = PARAMS,
-        report: bool = False) -> int:
+def run(bag: Path, folder: Path, *options: str, params: Path = PARAMS, report: bool = False,
+        code: int | None = DONE) -> Ended:
     """Run the program in this process; options may begin with more bags."""
     plain = () if report else ('--no-report',)
-    return main(arguments(bag, folder, *options, *plain, params=params))
+    return call(main, *arguments(bag, folder, *options, *plain, params=params), code=code)
 
 
 def decoded(bag: Path) -> list[tuple[str, int, Any]]:
@@ -132,20 +132,6 @@ def nanoseconds(message: Any) -> int:
     return int(message.header.stamp.sec) * SECOND + int(message.header.stamp.nanosec)
 
 
-def write_bag(folder: Path, of: Iterable[Recorded], node: str = NODE,
-              plugin: StoragePlugin = StoragePlugin.MCAP, **types: str) -> Path:
-    """Write a rosbag2; topics are made as they come, of types by the ends of their names."""
-    with Writer(folder, version=9, storage_plugin=plugin) as writer:
-        connections: dict[str, Any] = {}
-        for topic, when, data in of:
-            if topic not in connections:
-                connections[topic] = writer.add_connection(
-                    topic if topic.startswith('/') else f'{node}/{topic}',
-                    (KINDS | types)[topic.rpartition('/')[2]], typestore=STORE)
-            writer.write(connections[topic], when, data)
-    return folder
-
-
 def heave(number: int) -> Motion:
     """Return the same as the library's motion."""
     t = [0.01 * n for n in range(1, number + 1)]
@@ -164,8 +150,8 @@ def at_home(stamp: int, when: int) -> list[Recorded]:
 def replayed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Outputs]:
     """Return what a replay of the repository's bags wrote."""
     folder = tmp_path_factory.mktemp('replayed') / 'made' / 'for us'
-    assert main([*(str(ROOT / 'bags' / name) for name in BAGS), '--params', str(PARAMS),
-                 '--output', str(folder)]) == DONE
+    call(main, *(str(ROOT / 'bags' / name) for name in BAGS), '--params', PARAMS, '--output',
+         folder)
     return {name: outputs_of(folder / name) for name in BAGS}
 
 
@@ -403,7 +389,7 @@ def test_a_wrench_in_the_bag_is_used(tmp_path: Path) -> None:
     of = motion(20)
     at = 3 * 10
     of.insert(at, (WRENCH, of[at][1] - 1, messages.wrench(0, load)))
-    assert run(write_bag(tmp_path / 'loaded', of), tmp_path / 'out') == DONE
+    run(write_bag(tmp_path / 'loaded', of), tmp_path / 'out')
     forces = forces_of(rows_of(tmp_path / 'out' / 'loaded'))
     free = PLATFORM.inverse_dynamics(heave(20)).forces
     loaded = PLATFORM.inverse_dynamics(heave(20), load).forces
@@ -427,37 +413,32 @@ def test_a_combined_bag_gives_the_numbers_of_the_separate_one(tmp_path: Path) ->
             (0.0, 0.0, -0.05 * math.sin(0.01 * n), 0, 0, 0), names=['élan']))
         for n in range(1, 31)])
     params = parameter_file(tmp_path, 'setpoint: {source: combined}')
-    assert run(separate, tmp_path / 'out') == DONE
-    assert run(combined, tmp_path / 'out', params=params) == DONE
+    run(separate, tmp_path / 'out')
+    run(combined, tmp_path / 'out', params=params)
     assert rows_of(tmp_path / 'out' / 'combined') == rows_of(tmp_path / 'out' / 'separate')
 
 
-def test_a_bag_of_poses_is_quasi_static(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bag_of_poses_is_quasi_static(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'poses', motion(30)[::3])
     params = parameter_file(tmp_path, 'setpoint: {source: pose}')
-    assert run(bag, tmp_path / 'out', params=params, report=True) == DONE
+    run(bag, tmp_path / 'out', params=params, report=True)
     still = PLATFORM.inverse_dynamics(Motion(heave(30).position, np.eye(3)))
     rows = rows_of(tmp_path / 'out' / 'poses')
     assert forces_of(rows) == still.forces.tolist()
     # values that depend on velocities are not known, and not zero
     assert {row[f'{leg}_rate_m_s'] for row in rows for leg in PARAMETERS['joints']} == {''}
     assert {row['determinant_rate_m3_s'] for row in rows} == {''}
-    capsys.readouterr()
     for options, code in (((), LIMIT_MET), (('--differentiate', '--cutoff', '5'), DONE)):
-        assert run(bag, tmp_path / f'{code}', '--strict', *options, params=params) == code
-        text = capsys.readouterr().out
+        text = run(bag, tmp_path / f'{code}', '--strict', *options, params=params, code=code).out
         assert ('limits.velocity_max could not be checked' in text) is (code == LIMIT_MET)
         assert ('within all limits' in text) is (code == DONE)
 
 
-def test_control_characters_in_names_are_escaped(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_control_characters_in_names_are_escaped(tmp_path: Path) -> None:
     hostile = '/a\x1b[2J\rb'
     bag = write_bag(tmp_path / 'bag', [*motion(3), (hostile, RECORDED, messages.wrench(0))],
                     **{hostile[1:]: INPUT_TYPES[WRENCH]})
-    assert run(bag, tmp_path / 'out') == DONE
-    text = capsys.readouterr().out
+    text = run(bag, tmp_path / 'out').out
     assert '/a\\x1b[2J\\rb' in text
     assert not set(text) & {'\x1b', '\r'}
 
@@ -465,9 +446,9 @@ def test_control_characters_in_names_are_escaped(
 def test_a_bag_of_sqlite_gives_the_same(tmp_path: Path) -> None:
     for plugin in (StoragePlugin.MCAP, StoragePlugin.SQLITE3):
         bag = write_bag(tmp_path / plugin.name, motion(30), plugin=plugin)
-        assert run(bag, tmp_path / 'out') == DONE
+        run(bag, tmp_path / 'out')
     # and without its metadata, by the file alone
-    assert run(tmp_path / 'SQLITE3' / 'SQLITE3.db3', tmp_path / 'alone') == DONE
+    run(tmp_path / 'SQLITE3' / 'SQLITE3.db3', tmp_path / 'alone')
     mcap, sqlite, alone = (outputs_of(folder) for folder in (
         tmp_path / 'out' / 'MCAP', tmp_path / 'out' / 'SQLITE3', tmp_path / 'alone' / 'SQLITE3'))
     assert len(mcap.rows) == 30
@@ -481,25 +462,21 @@ def test_a_bag_of_sqlite_gives_the_same(tmp_path: Path) -> None:
 def test_setpoints_without_stamps_are_stamped_as_they_were_recorded(tmp_path: Path) -> None:
     times = [RECORDED + n * 10 * MS for n in range(5)]
     bag = write_bag(tmp_path / 'bag', [each for when in times for each in at_home(0, when)])
-    assert run(bag, tmp_path / 'out') == DONE
+    run(bag, tmp_path / 'out')
     assert [int(row['stamp_ns']) for row in rows_of(tmp_path / 'out' / 'bag')] == times
 
 
-def test_a_time_out_of_range_of_a_stamp_is_counted(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_time_out_of_range_of_a_stamp_is_counted(tmp_path: Path) -> None:
     late = 2 ** 31 * SECOND
     bag = write_bag(tmp_path / 'bag', [*at_home(0, late - 1), *at_home(0, late)])
-    assert run(bag, tmp_path / 'out') == DONE
-    assert 'setpoint: 1 rejected: out of range' in capsys.readouterr().out
+    assert 'setpoint: 1 rejected: out of range' in run(bag, tmp_path / 'out').out
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 1
 
 
-def test_a_bag_that_loops_is_followed_with_a_notice(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bag_that_loops_is_followed_with_a_notice(tmp_path: Path) -> None:
     lap = motion(50)
     bag = write_bag(tmp_path / 'bag', lap + [(t, when + SECOND, d) for t, when, d in lap])
-    assert run(bag, tmp_path / 'out') == DONE
-    printed = capsys.readouterr().out
+    printed = run(bag, tmp_path / 'out').out
     assert printed.count('followed as a restart') == 1
     assert 'rejected' not in printed
     assert '100 setpoints in 0.98 s, 1 restart' in printed
@@ -513,14 +490,14 @@ def test_a_restart_that_cannot_be_answered_is_that_of_the_next_setpoint(tmp_path
         of += [('setpoint/pose', when, messages.pose(stamp, (x, 0.0, 1.1))),
                ('setpoint/twist', when, messages.twist(stamp)),
                ('setpoint/accel', when, messages.accel(stamp))]
-    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
+    run(write_bag(tmp_path / 'bag', of), tmp_path / 'out')
     found = summary_of(tmp_path / 'out' / 'bag')['setpoints']
     assert (found['answered'], found['restarts']) == (2, 1)
 
 
 def test_another_name_of_the_node(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(5), node='/cell/hexapod')
-    assert run(bag, tmp_path / 'out', '--node', 'cell/hexapod') == DONE
+    run(bag, tmp_path / 'out', '--node', 'cell/hexapod')
     assert set(outputs_of(tmp_path / 'out' / 'bag').messages) == {
         TF, TF_STATIC, ROBOT_DESCRIPTION,
         *(f'/cell/hexapod/{topic}' for topic in (
@@ -532,7 +509,7 @@ def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:
     of = [(topic, when, messages.pose(20 * MS, (0.0, 0.0, 0.0))
            if topic == POSE and when == RECORDED + 20 * MS else data)
           for topic, when, data in motion(3)]
-    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
+    run(write_bag(tmp_path / 'bag', of), tmp_path / 'out')
     outputs = outputs_of(tmp_path / 'out' / 'bag')
     assert [row['leg_1_force_n'] != '' for row in outputs.rows] == [True, False, True]
     assert all(outputs.rows[1][f'leg_{leg}_demanded_force_n'] == '' for leg in range(1, 7))
@@ -540,26 +517,22 @@ def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:
     assert [len(m.effort) for _, m in outputs.messages[f'{NODE}/leg_states']] == [6, 0, 6]
 
 
-def test_a_bag_with_z_down_begins_beyond_a_singularity(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bag_with_z_down_begins_beyond_a_singularity(tmp_path: Path) -> None:
     of = [(topic, when,
            messages.pose(when - RECORDED, (0.0, 0.0, -1.1)) if topic == POSE else data)
           for topic, when, data in motion(2)]
-    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
-    printed = ' '.join(capsys.readouterr().out.split())
+    printed = ' '.join(run(write_bag(tmp_path / 'bag', of), tmp_path / 'out').out.split())
     assert 'the motion begins beyond a singularity; possible error' in printed
     assert [each['topic'] for each in summary_of(tmp_path / 'out' / 'bag')['mistakes']] == [POSE]
 
 
 # Exit codes
 
-def test_a_bag_without_answers_is_reported(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bag_without_answers_is_reported(tmp_path: Path) -> None:
     cut = [(topic, when, data[:-1]) for topic, when, data in motion(3)]
     bag = write_bag(tmp_path / 'bag', cut)
     # nothing was checked: that must not pass as done
-    assert run(bag, tmp_path / 'out') == PARTLY_READ
-    printed = capsys.readouterr().out
+    printed = run(bag, tmp_path / 'out', code=PARTLY_READ).out
     assert 'no setpoint could be answered' in printed
     for topic in TOPICS:
         assert f'{topic}: 3 rejected: {MALFORMED}' in printed
@@ -570,10 +543,8 @@ def test_a_bag_without_answers_is_reported(
     ('clear', ('--strict',), DONE), ('singular', (), DONE),
     ('singular', ('--strict',), LIMIT_MET)])
 def test_strict_exits_with_1_at_limits_and_warnings(
-        name: str, options: tuple[str, ...], code: int, tmp_path: Path,
-        capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(ROOT / 'bags' / name, tmp_path, *options) == code
-    printed = capsys.readouterr()
+        name: str, options: tuple[str, ...], code: int, tmp_path: Path) -> None:
+    printed = run(ROOT / 'bags' / name, tmp_path, *options, code=code)
     assert '1001 setpoints in 10.00 s' in printed.out
     assert ('crossed zero at t = 8.4' in printed.out) == (name == 'singular')
     assert not printed.err
@@ -584,12 +555,12 @@ def test_strict_exits_with_1_at_a_limit_without_a_warning(tmp_path: Path) -> Non
     bag = write_bag(tmp_path / 'bag', motion(3))
     params = tmp_path / 'platform.yaml'
     PARAMETERS.replaced({'limits.force_max': 100.0}).to_yaml(params)
-    assert run(bag, tmp_path / 'out', '--strict', params=params) == LIMIT_MET
+    run(bag, tmp_path / 'out', '--strict', params=params, code=LIMIT_MET)
     assert np.all(np.abs(forces_of(rows_of(tmp_path / 'out' / 'bag'))) == 100.0)
 
 
 def test_twists_that_are_not_those_of_the_poses_are_no_motion_that_holds_all_limits(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+        tmp_path: Path, snapshot: Snapshot) -> None:
     """Twists and accelerations that are never filled."""
     empty = {TWIST: messages.twist, ACCEL: messages.accel}
     given = [(topic.removeprefix(f'{NODE}/'), when, message)
@@ -598,9 +569,9 @@ def test_twists_that_are_not_those_of_the_poses_are_no_motion_that_holds_all_lim
     bag = write_bag(tmp_path / 'bag', (
         (topic, when, empty[topic](nanoseconds(message)) if topic in empty
          else whole[topic, when]) for topic, when, message in given if topic in TOPICS))
-    assert run(bag, tmp_path / 'out') == DONE
-    assert run(bag, tmp_path / 'strict', '--strict') == LIMIT_MET
-    printed = ' '.join(capsys.readouterr().out.split())  # without line breaks
+    run(bag, tmp_path / 'out')
+    strict = run(bag, tmp_path / 'strict', '--strict', code=LIMIT_MET)
+    printed = ' '.join(strict.out.split())  # without line breaks
     assert 'within all limits' not in printed
     assert 'no limit was met by inputs that contradict each other' in printed
     found = summary_of(tmp_path / 'out' / 'bag')['mistakes']
@@ -612,7 +583,7 @@ def test_twists_that_are_not_those_of_the_poses_are_no_motion_that_holds_all_lim
 
 
 @pytest.fixture
-def rejected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Rejected:
+def rejected(tmp_path: Path) -> Rejected:
     """Return a function that gives the one line printed for a bag; the code is 2, no results."""
     def given(bag: Path, *options: object, params: Path = PARAMS,
               output: Path = tmp_path / 'rejected') -> str:
@@ -623,9 +594,8 @@ def rejected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Rejected:
                 (path, *at[:7], at.st_mtime_ns, at.st_ctime_ns) for path, at in stats)]
 
         before = found()
-        capsys.readouterr()
-        assert main(arguments(bag, output, *map(str, options), params=params)) == BAD_INPUT
-        printed = capsys.readouterr()
+        printed = call(main, *arguments(bag, output, *map(str, options), params=params),
+                       code=BAD_INPUT)
         assert not printed.out
         assert printed.err.count('\n') == 1
         assert printed.err.startswith('stewart_replay: ')
@@ -655,12 +625,8 @@ def test_bad_bags_and_parameters_are_rejected_before_anything_is_written(
     (['--params', 'y.yaml'], 'usage: stewart_replay'), (['--cutoff', '5'], '--cutoff'),
     (['--differentiate', '--cutoff', '1e300'], '--cutoff'),
     *((['--node', name], 'not a valid node name') for name in ('', '/', 'a b', '1st', 'a//b'))])
-def test_bad_arguments(
-        options: list[str], text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as caught:
-        run(ROOT / 'bags' / 'clear', tmp_path, *options)
-    assert caught.value.code == BAD_INPUT
-    assert text in capsys.readouterr().err
+def test_bad_arguments(options: list[str], text: str, tmp_path: Path) -> None:
+    assert text in run(ROOT / 'bags' / 'clear', tmp_path, *options, code=BAD_INPUT).err
 
 
 def test_a_missing_topic_lists_the_topics_of_the_bag(
@@ -683,10 +649,10 @@ def test_a_topic_of_another_type(
 def test_a_bag_of_ros_1_gives_the_same(
         tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     of = motion(30)
-    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
+    run(write_bag(tmp_path / 'bag', of), tmp_path / 'out')
     write_ros_1(tmp_path / 'old.bag', [
         (f'{NODE}/{topic}', when, data) for topic, when, data in of], None)
-    assert run(tmp_path / 'old.bag', tmp_path / 'out') == DONE
+    run(tmp_path / 'old.bag', tmp_path / 'out')
     old, new = rows_of(tmp_path / 'out' / 'old'), rows_of(tmp_path / 'out' / 'bag')
     assert len(new) == 30
     assert old == new
@@ -713,16 +679,14 @@ def test_bags_of_one_name_are_rejected_before_anything_is_written(
 def test_a_point_in_a_name_is_no_suffix(tmp_path: Path) -> None:
     bags = [write_bag(tmp_path / name, motion(3)) for name in (
         'run_2024-05-01-12.00.01', 'run_2024-05-01-12.00.02')]
-    assert run(bags[0], tmp_path / 'out', str(bags[1])) == DONE
+    run(bags[0], tmp_path / 'out', str(bags[1]))
     assert sorted(path.name for path in (tmp_path / 'out').iterdir()) == [
         'fleet.csv', 'index.html', *(bag.name for bag in bags)]
 
 
-def test_a_bad_bag_is_reported_and_the_others_are_replayed(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_bag_is_reported_and_the_others_are_replayed(tmp_path: Path) -> None:
     one, two = (write_bag(tmp_path / name, motion(3)) for name in ('one', 'two'))
-    assert run(one, tmp_path / 'out', str(tmp_path / 'none'), str(two)) == BAD_INPUT
-    printed = capsys.readouterr()
+    printed = run(one, tmp_path / 'out', str(tmp_path / 'none'), str(two), code=BAD_INPUT)
     assert printed.out.count('3 setpoints') == 2
     assert str(tmp_path / 'none') in printed.err
     assert sorted(path.name for path in (tmp_path / 'out').iterdir()) == [
@@ -761,15 +725,13 @@ def damaged_bag(file: Path) -> Path:
     return file
 
 
-def test_the_rest_of_a_damaged_bag_is_replayed(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+def test_the_rest_of_a_damaged_bag_is_replayed(tmp_path: Path, snapshot: Snapshot) -> None:
     bag = damaged_bag(tmp_path / 'damaged.mcap')
-    assert run(bag, tmp_path / 'out') == PARTLY_READ
-    printed = capsys.readouterr()
+    printed = run(bag, tmp_path / 'out', code=PARTLY_READ)
     snapshot(printed.err)
     rows = rows_of(tmp_path / 'out' / 'damaged')
     assert 80 < len(rows) < 95
-    assert run(write_bag(tmp_path / 'whole', motion(100)), tmp_path / 'out') == DONE
+    run(write_bag(tmp_path / 'whole', motion(100)), tmp_path / 'out')
     expected = rows_of(tmp_path / 'out' / 'whole')
     lost = [n for n, row in enumerate(expected) if row not in rows]
     # only the messages in the chunk
@@ -778,50 +740,48 @@ def test_the_rest_of_a_damaged_bag_is_replayed(
 
 
 @pytest.mark.parametrize('plugin', list(StoragePlugin))
-def test_a_damaged_bag_never_crashes_the_replay(
-        plugin: StoragePlugin, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_damaged_bag_never_crashes_the_replay(plugin: StoragePlugin, tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(60), plugin=plugin)
     file = next(path for path in bag.iterdir() if path.suffix in ('.mcap', '.db3'))
     whole = file.read_bytes()
     for n, at in enumerate(range(0, len(whole), len(whole) // 6)):
         file.write_bytes(whole[:at])
-        assert run(bag, tmp_path / 'cut' / str(n)) in (BAD_INPUT, PARTLY_READ)
-        assert capsys.readouterr().err.count('\n') == 1
+        done = run(bag, tmp_path / 'cut' / str(n), code=None)
+        assert done.code in (BAD_INPUT, PARTLY_READ) and done.err.count('\n') == 1
         file.write_bytes(whole[:at] + bytes(b ^ 0xa5 for b in whole[at:at + 64])
                          + whole[at + 64:])
-        assert run(bag, tmp_path / 'spoiled' / str(n)) in (DONE, BAD_INPUT, PARTLY_READ)
-        capsys.readouterr()
+        assert run(bag, tmp_path / 'spoiled' / str(n), code=None).code in (
+            DONE, BAD_INPUT, PARTLY_READ)
 
 
 # In a process of its own
 
 @pytest.mark.slow
 def test_it_runs_as_a_program(tmp_path: Path, replayed: dict[str, Outputs]) -> None:
-    done = subprocess.run(
-        [sys.executable, '-m', 'stewart_dynamics.replay', *(ROOT / 'bags' / name for name in BAGS),
-         '--params', PARAMS, '--output', tmp_path / 'out', '--strict', '--no-report'],
-        capture_output=True, text=True, timeout=300, check=False)
-    assert (done.returncode, done.stderr) == (LIMIT_MET, '')
-    assert done.stdout.count('setpoints in') == 3
+    done = run_program(
+        sys.executable, '-m', 'stewart_dynamics.replay', *(ROOT / 'bags' / name for name in BAGS),
+        '--params', PARAMS, '--output', tmp_path / 'out', '--strict', '--no-report',
+        code=LIMIT_MET)
+    assert done.err == ''
+    assert done.out.count('setpoints in') == 3
     for name in BAGS:
         assert (tmp_path / 'out' / name / 'legs.csv').read_bytes() == (
             replayed[name].folder / 'legs.csv').read_bytes()
 
 
 def test_the_results_are_readable_by_all(tmp_path: Path) -> None:
-    assert run(ROOT / 'bags' / 'clear', tmp_path) == DONE
+    run(ROOT / 'bags' / 'clear', tmp_path)
     for path in (tmp_path / 'clear', tmp_path / 'clear' / 'bag'):
         assert path.stat().st_mode & 0o777 == 0o755
 
 
 def test_it_needs_no_ros() -> None:
-    done = subprocess.run(
-        [sys.executable, '-c', 'import sys, stewart_dynamics.replay; '
-         'print([n for n in sys.modules if n.startswith(("rclpy", "rcl_interfaces", "rosidl", '
-         '"geometry_msgs", "sensor_msgs", "std_msgs", "stewart_dynamics.node.dynamics_node")) '
-         'or n == "stewart_dynamics.ros.run"])'],
-        capture_output=True, text=True, timeout=300, check=True)
-    assert done.stdout.strip() == '[]'
+    done = run_program(
+        sys.executable, '-c', 'import sys, stewart_dynamics.replay; '
+        'print([n for n in sys.modules if n.startswith(("rclpy", "rcl_interfaces", "rosidl", '
+        '"geometry_msgs", "sensor_msgs", "std_msgs", "stewart_dynamics.node.dynamics_node")) '
+        'or n == "stewart_dynamics.ros.run"])')
+    assert done.out.strip() == '[]'
 
 
 @pytest.fixture(scope='module')
@@ -851,10 +811,10 @@ def test_a_killed_replay_leaves_nothing_under_the_final_name(
         assert process.wait(300) == -signal.SIGKILL
     assert not (tmp_path / 'out' / 'long').exists()
     # its partial results do not prevent another replay
-    assert run(ROOT / 'bags' / 'clear', tmp_path / 'out') == DONE
+    run(ROOT / 'bags' / 'clear', tmp_path / 'out')
     # and are removed by that of a bag of the same name
     assert len(list((tmp_path / 'out').glob('.long.*'))) == 1
-    assert run(chunked_bag(tmp_path / 'long.mcap', 100, 4000), tmp_path / 'out') == DONE
+    run(chunked_bag(tmp_path / 'long.mcap', 100, 4000), tmp_path / 'out')
     assert not list((tmp_path / 'out').glob('.*'))
 
 
@@ -878,16 +838,14 @@ def test_an_interrupted_replay_leaves_nothing(
     (ZeroDivisionError('by zero\nin two lines'), r'unexpected error, please report it: '
      r'ZeroDivisionError: by zero in two lines \(test_replay.py, line \d+\)')])
 def test_unexpected_errors_are_one_line_and_leave_nothing(
-        error: Exception, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
-        monkeypatch: pytest.MonkeyPatch) -> None:
+        error: Exception, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise error
 
     monkeypatch.setattr(Summary, 'values', fail)
     out = tmp_path / 'out'
     for others in ([], [str(ROOT / 'bags' / 'flawed')]):
-        assert run(ROOT / 'bags' / 'clear', out, *others) == BAD_INPUT
-        lines = capsys.readouterr().err.splitlines()
+        lines = run(ROOT / 'bags' / 'clear', out, *others, code=BAD_INPUT).err.splitlines()
         assert len(lines) == 1 + len(others)
         for line in lines:
             assert re.fullmatch(f'stewart_replay: (.*: )?{text}', line)
@@ -911,15 +869,15 @@ def test_the_library_raises_what_the_program_prints(tmp_path: Path, snapshot: Sn
 
 
 def test_joint_angles_clearance_and_joint_forces_are_in_the_results_where_they_have_limits(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path) -> None:
     platform = StewartPlatform(PARAMETERS.replaced({
         'limits.base_joint_angle_max': 0.5, 'limits.leg_clearance_min': 0.1,
         'limits.joint_force_max': 1e5,
         'legs.cylinder.radius': 0.05, 'legs.cylinder.length': 0.8, 'legs.piston.radius': 0.03}))
     file = tmp_path / 'hexapod.yaml'
     platform.parameters.to_yaml(file)
-    assert run(ROOT / 'bags' / 'clear', tmp_path / 'out', '--strict', params=file,
-               report=True) == LIMIT_MET
+    text = run(ROOT / 'bags' / 'clear', tmp_path / 'out', '--strict', params=file, report=True,
+               code=LIMIT_MET).out
     folder = tmp_path / 'out' / 'clear'
     rows = rows_of(folder)
     poses = Pose.from_quaternion(*(np.array(
@@ -928,7 +886,6 @@ def test_joint_angles_clearance_and_joint_forces_are_in_the_results_where_they_h
     angles, _ = platform.joint_angles(poses)
     clearances = LegClearance(platform.parameters)(motion_rows(poses))
     summary = summary_of(folder)
-    text = capsys.readouterr().out
     for leg, name in enumerate(PARAMETERS['joints']):
         of_leg = [float(row[f'{name}_base_joint_angle_rad']) for row in rows]
         np.testing.assert_allclose(of_leg, angles[:, leg], rtol=0.0, atol=1e-14)
@@ -960,7 +917,7 @@ def test_remapped_topics_are_found_by_their_type(tmp_path: Path) -> None:
     of = [(names[topic], when, data) for topic, when, data in motion(20)]
     bag = write_bag(tmp_path / 'bag', of, **{
         name.rpartition('/')[2]: INPUT_TYPES[topic] for topic, name in names.items()})
-    assert run(bag, tmp_path / 'out') == DONE
+    run(bag, tmp_path / 'out')
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
     assert summary_of(tmp_path / 'out' / 'bag')['inputs']['topics'] == names
 
@@ -968,7 +925,7 @@ def test_remapped_topics_are_found_by_their_type(tmp_path: Path) -> None:
 def test_a_namespace_is_found_by_the_end_of_the_name(tmp_path: Path) -> None:
     of = [(f'/cell/{NODE}/{topic}', when, data) for topic, when, data in motion(20)]
     bag = write_bag(tmp_path / 'bag', [*of, ('/else/pose', RECORDED, messages.pose(0))])
-    assert run(bag, tmp_path / 'out') == DONE
+    run(bag, tmp_path / 'out')
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
 
 
@@ -980,7 +937,7 @@ def test_ambiguous_topics_are_listed_and_can_be_selected(
         tmp_path / 'bag', [*of, ('/b/where', RECORDED, messages.pose(0, (0.0, 0.0, 1.2)))],
         where=INPUT_TYPES[POSE])
     snapshot(rejected(bag))
-    assert run(bag, tmp_path / 'out', '--pose', '/a/where') == DONE
+    run(bag, tmp_path / 'out', '--pose', '/a/where')
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
     for topic, words in (('/none', 'has no topic /none; it contains /a/where (geometry'),
                          (f'{NODE}/{TWIST}', 'must be a geometry_msgs/msg/PoseStamped')):
@@ -990,8 +947,8 @@ def test_ambiguous_topics_are_listed_and_can_be_selected(
 def test_a_wrench_is_never_found_by_its_type(tmp_path: Path) -> None:
     load = ('/cell/load', RECORDED, messages.wrench(0, (0.0, 0.0, -1000.0, 0, 0, 0)))
     bag = write_bag(tmp_path / 'bag', [load, *motion(5)], load=INPUT_TYPES[WRENCH])
-    assert run(bag, tmp_path / 'free') == DONE
-    assert run(bag, tmp_path / 'loaded', '--wrench', '/cell/load') == DONE
+    run(bag, tmp_path / 'free')
+    run(bag, tmp_path / 'loaded', '--wrench', '/cell/load')
     free, loaded = (rows_of(tmp_path / name / 'bag')[0]['leg_1_force_n'] for name in (
         'free', 'loaded'))
     assert float(loaded) > float(free) + 100.0
@@ -1003,7 +960,7 @@ def test_combined_by_its_option(tmp_path: Path, rejected: Rejected, snapshot: Sn
         all=INPUT_TYPES[COMBINED])
     snapshot(rejected(bag))
     snapshot(rejected(bag, '--differentiate', '--combined', '/all'))
-    assert run(bag, tmp_path / 'out', '--combined', '/cmd/all') == DONE
+    run(bag, tmp_path / 'out', '--combined', '/cmd/all')
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 8
 
 
@@ -1034,7 +991,7 @@ def test_summary_and_report_are_written(replayed: dict[str, Outputs]) -> None:
 
 def test_parquet_has_the_columns_and_numbers_of_csv(
         tmp_path: Path, replayed: dict[str, Outputs]) -> None:
-    assert run(ROOT / 'bags' / 'singular', tmp_path, '--parquet') == DONE
+    run(ROOT / 'bags' / 'singular', tmp_path, '--parquet')
     assert not (tmp_path / 'singular' / 'legs.csv').exists()
     table = pyarrow.parquet.read_table(tmp_path / 'singular' / 'legs.parquet')
     rows = replayed['singular'].rows
@@ -1048,10 +1005,10 @@ def test_parquet_has_the_columns_and_numbers_of_csv(
 def test_force_replaces_results_and_nothing_else(
         tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     clear = ROOT / 'bags' / 'clear'
-    assert run(clear, tmp_path, report=True) == DONE
+    run(clear, tmp_path, report=True)
     for words in (f'{tmp_path / "clear"}: exists already', '--force replaces results'):
         assert words in rejected(clear, output=tmp_path)
-    assert run(clear, tmp_path, '--force') == DONE
+    run(clear, tmp_path, '--force')
     assert sorted(path.name for path in (tmp_path / 'clear').iterdir()) == [
         'bag', 'legs.csv', 'summary.json']
     assert summary_of(tmp_path / 'clear')['force_breakdown'] is None
@@ -1063,12 +1020,12 @@ def test_force_replaces_results_and_nothing_else(
 
 
 def test_force_keeps_old_results_where_new_ones_fail(tmp_path: Path) -> None:
-    assert run(write_bag(tmp_path / 'a' / 'bag', motion(5)), tmp_path / 'out') == DONE
+    run(write_bag(tmp_path / 'a' / 'bag', motion(5)), tmp_path / 'out')
     before = (tmp_path / 'out' / 'bag' / 'legs.csv').read_bytes()
     broken = tmp_path / 'b' / 'bag.mcap'
     broken.parent.mkdir()
     broken.write_bytes(b'no bag')
-    assert run(broken, tmp_path / 'out', '--force') == BAD_INPUT
+    run(broken, tmp_path / 'out', '--force', code=BAD_INPUT)
     assert (tmp_path / 'out' / 'bag' / 'legs.csv').read_bytes() == before
 
 
@@ -1078,7 +1035,7 @@ def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
         # two writers, of simulated and of real time
         stamp = n * 10 * MS + (n % 2) * 1_700_000_000 * SECOND
         of += at_home(stamp, RECORDED + n)
-    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
+    run(write_bag(tmp_path / 'bag', of), tmp_path / 'out')
     found = summary_of(tmp_path / 'out' / 'bag')['setpoints']
     assert found['answered'] == 20
     assert found['duration_s'] == pytest.approx(9 * 1_700_000_000.0, rel=1e-6)
@@ -1094,18 +1051,16 @@ def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
      "name, *_: end() if name == 'argparse' else None)}))", 130, 'interrupted')])
 def test_a_signal_at_the_start_or_end_is_no_traceback(
         sent: str, when: str, code: int, text: str, snapshot: Snapshot) -> None:
-    done = subprocess.run(
-        [sys.executable, '-c', 'import atexit, signal, sys\n'
-         f'def end():\n    signal.raise_signal(signal.{sent})\n'
-         f'from stewart_dynamics.replay import main\n{when}\nsys.exit(main())',
-         'nowhere', '--params', str(PARAMS)], capture_output=True, text=True, timeout=300)
-    assert done.returncode == code
-    snapshot(done.stderr)
+    done = run_program(sys.executable, '-c', 'import atexit, signal, sys\n'
+                       f'def end():\n    signal.raise_signal(signal.{sent})\n'
+                       f'from stewart_dynamics.replay import main\n{when}\nsys.exit(main())',
+                       'nowhere', '--params', PARAMS, code=code)
+    snapshot(done.err)
 
 
 def test_an_interrupt_while_results_are_replaced_keeps_some(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert run(ROOT / 'bags' / 'clear', tmp_path) == DONE
+    run(ROOT / 'bags' / 'clear', tmp_path)
     rename, done = Path.rename, []
 
     def interrupted(path: Path, to: Path) -> Path:
@@ -1115,7 +1070,7 @@ def test_an_interrupt_while_results_are_replaced_keeps_some(
         return rename(path, to)
 
     monkeypatch.setattr(Path, 'rename', interrupted)
-    assert run(ROOT / 'bags' / 'clear', tmp_path, '--force') == INTERRUPTED
+    run(ROOT / 'bags' / 'clear', tmp_path, '--force', code=INTERRUPTED)
     assert len(rows_of(tmp_path / 'clear')) == 1001
     assert [path.name for path in tmp_path.iterdir()] == ['clear']
 
@@ -1124,22 +1079,19 @@ def test_names_that_the_terminal_cannot_encode(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = io.TextIOWrapper(io.BytesIO(), encoding='ascii', write_through=True)
     monkeypatch.setattr(sys, 'stdout', terminal)
-    assert run(write_bag(tmp_path / 'ü', motion(3)), tmp_path / 'out') == DONE
+    assert main(arguments(write_bag(tmp_path / 'ü', motion(3)), tmp_path / 'out')) == DONE
     assert b'\\xfc:\n3 setpoints' in terminal.buffer.getvalue()
 
 
 # Bags that have only poses
 
-def test_poses_are_differentiated(
-        tmp_path: Path, rejected: Rejected, capsys: pytest.CaptureFixture[str],
-        snapshot: Snapshot) -> None:
+def test_poses_are_differentiated(tmp_path: Path, rejected: Rejected, snapshot: Snapshot) -> None:
     of = motion(400)
     bag = write_bag(tmp_path / 'bag', of[::3])
     snapshot(rejected(bag))
-    assert run(bag, tmp_path / 'out', '--differentiate', '--cutoff', '5') == DONE
-    printed = capsys.readouterr().out
+    printed = run(bag, tmp_path / 'out', '--differentiate', '--cutoff', '5').out
     assert 'smoothing splines through the poses, cut-off frequency 5 Hz' in printed
-    assert run(write_bag(tmp_path / 'whole', of), tmp_path / 'out') == DONE
+    run(write_bag(tmp_path / 'whole', of), tmp_path / 'out')
     made, whole = (rows_of(tmp_path / 'out' / name) for name in ('bag', 'whole'))
     assert [row['stamp_ns'] for row in made] == [row['stamp_ns'] for row in whole]
     # away from the ends as the twist and acceleration that were recorded
@@ -1167,13 +1119,12 @@ def test_measured_legs_that_are_not_compared_are_a_notice(tmp_path: Path) -> Non
     expected = ('/hexapod/state: not used; --measured compares the efforts of measured legs with '
                 'the computed forces')
     for options, given in (((), [expected]), (('--measured', '/hexapod/state'), [])):
-        run(bag, tmp_path / 'out', '--force', *options)
+        run(bag, tmp_path / 'out', '--force', *options, code=None)
         notices = summary_of(tmp_path / 'out' / 'bag')['notices']
         assert [each for each in notices if '--measured' in each] == given
 
 
-def test_measured_forces_give_the_external_load(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_measured_forces_give_the_external_load(tmp_path: Path) -> None:
     load = np.array([30.0, -10.0, -200.0, 5.0, 8.0, -4.0])
     of = motion(200)
     loads = np.where((np.arange(200) >= 100)[:, None], load, np.zeros(6))
@@ -1185,14 +1136,14 @@ def test_measured_forces_give_the_external_load(
             stamp, ['other', *names], [], [], [0.0, *forces[n][::-1]])))
     of.sort(key=lambda each: each[1])
     bag = write_bag(tmp_path / 'bag', of, state=JOINT_STATE)
-    assert run(bag, tmp_path / 'out', '--measured', '/hexapod/state', report=True) == DONE
+    out = run(bag, tmp_path / 'out', '--measured', '/hexapod/state', report=True).out
     found = summary_of(tmp_path / 'out' / 'bag')['measured']
     assert found['setpoints_compared'] == 200
     without = PLATFORM.inverse_dynamics(heave(200)).forces
     difference = np.sqrt(np.mean((forces - without) ** 2))
     assert found['headline'].startswith(
         f'measured and computed forces differ by {difference:.3g} N RMS')
-    assert capsys.readouterr().out.splitlines()[1] == found['headline']
+    assert out.splitlines()[1] == found['headline']
     # with the sign of the load
     for axis, value in zip(('x', 'y', 'z'), load, strict=False):
         peak = found['external_wrench'][f'force_{axis}']
@@ -1215,10 +1166,9 @@ def test_the_page_names_files_that_a_bag_runs_through(tmp_path: Path) -> None:
     threading.setprofile(note)
     sys.setprofile(note)
     try:
-        code = run(ROOT / 'bags' / 'clear', tmp_path / 'replayed', report=True)
+        run(ROOT / 'bags' / 'clear', tmp_path / 'replayed', report=True)
     finally:
         sys.setprofile(None)
         threading.setprofile(None)
-    assert code == 0
     assert len(on_page) > 10
     assert set(on_page) <= found

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import messages
-from messages import Feed, motion, MS, RECORDED, Recorded
+from messages import Feed, JOINT_STATE, motion, MS, RECORDED, Recorded, write_bag
 import numpy as np
+from programs import call, Ended
 import pytest
 from referees import rotation_about
 from scipy.spatial.transform import Rotation
@@ -31,8 +32,7 @@ from stewart_dynamics.setpoints.input_messages import (
     TWIST, WRENCH)
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.step import Batch, FIRST, Outputs as Answer, Step
-from test_replay import (
-    JOINT_STATE, nanoseconds, Outputs, outputs_of, PARAMETERS, six_of, write_bag)
+from test_replay import nanoseconds, Outputs, outputs_of, PARAMETERS, six_of
 
 PROGRAM = 'stewart_replay'
 
@@ -88,11 +88,12 @@ def answers(parameters: Parameters, of: Iterable[Recorded]) -> list[tuple[Batch,
     return found
 
 
-def run(bag: Path, parameters: Parameters, folder: Path, *options: str) -> int:
+def run(bag: Path, parameters: Parameters, folder: Path, *options: str, code: int | None = DONE,
+        ) -> Ended:
     folder.mkdir(exist_ok=True)
     parameters.to_yaml(folder / 'platform.yaml')
-    return main([str(bag), '--params', str(folder / 'platform.yaml'), '--output',
-                 str(folder / 'out'), *options])
+    return call(main, bag, '--params', folder / 'platform.yaml', '--output', folder / 'out',
+                *options, code=code)
 
 
 def summary_of(folder: Path) -> dict[str, Any]:
@@ -102,7 +103,7 @@ def summary_of(folder: Path) -> dict[str, Any]:
 
 def replayed(of: list[Recorded], parameters: Parameters, folder: Path, *options: str) -> Outputs:
     bag = write_bag(folder / 'bag', of, **TYPES)
-    assert run(bag, parameters, folder, *options) == DONE
+    run(bag, parameters, folder, *options)
     return outputs_of(folder / 'out' / 'bag')
 
 
@@ -116,9 +117,10 @@ TYPES = {'deck_pose': INPUT_TYPES[BASE_POSE], 'deck_twist': INPUT_TYPES[BASE_TWI
 
 @pytest.mark.parametrize('source', MOVING)
 def test_a_replay_gives_the_bits_of_the_step_and_states_where_the_base_is_not_known(
-        source: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        source: str, tmp_path: Path) -> None:
     parameters, of = parameters_of(source), at_sea(source)
-    outputs = replayed(of, parameters, tmp_path)
+    text = ' '.join(run(write_bag(tmp_path / 'bag', of), parameters, tmp_path).out.split())
+    outputs = outputs_of(tmp_path / 'out' / 'bag')
     expected = answers(parameters, of)
     unknown = [n for n, (_, answer) in enumerate(expected)
                if np.isnan(answer.demanded_efforts).all()]
@@ -160,7 +162,7 @@ def test_a_replay_gives_the_bits_of_the_step_and_states_where_the_base_is_not_kn
         assert having[0]
         assert message[0].tobytes() in content
 
-    found, text = summary_of(tmp_path), ' '.join(capsys.readouterr().out.split())
+    found = summary_of(tmp_path)
     lacking = [row['time_s'] for row in outputs.rows if not row['base_force_z_n']]
     assert found['setpoints']['base_unknown'] == len(lacking)
     assert found['setpoints']['base_unknown_first_at_s'] == 0.0
@@ -197,20 +199,18 @@ def test_strict_rejects_forces_that_could_not_be_checked(tmp_path: Path) -> None
     bag = write_bag(tmp_path / 'bag', at_sea('imu', 50))
     for name, limit, code in (('limited', 6000.0, LIMIT_MET), ('free', None, DONE)):
         parameters = parameters_of('imu', **{'limits.force_max': limit})
-        assert run(bag, parameters, tmp_path / name, '--no-report') == DONE
-        assert run(bag, parameters, tmp_path / name, '--strict', '--no-report', '--force') == code
+        run(bag, parameters, tmp_path / name, '--no-report')
+        run(bag, parameters, tmp_path / name, '--strict', '--no-report', '--force', code=code)
     # the base is known at every setpoint
     known = write_bag(tmp_path / 'known', [each for each in at_sea('imu', 50)
                                            if each[1] > RECORDED + 80 * MS])
-    assert run(known, parameters_of('imu'), tmp_path / 'k', '--strict', '--no-report') == DONE
+    run(known, parameters_of('imu'), tmp_path / 'k', '--strict', '--no-report')
 
 
-def test_a_bag_without_any_known_base_is_incomplete(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+def test_a_bag_without_any_known_base_is_incomplete(tmp_path: Path, snapshot: Snapshot) -> None:
     late = [*motion(20), *deck('pose', 900 * MS)]
     bag = write_bag(tmp_path / 'bag', late)
-    assert run(bag, parameters_of('pose'), tmp_path / 'a') == PARTLY_READ
-    snapshot(capsys.readouterr().err)
+    snapshot(run(bag, parameters_of('pose'), tmp_path / 'a', code=PARTLY_READ).err)
     assert summary_of(tmp_path / 'a')['base_wrench']['force']['peak_n'] is None
 
 
@@ -218,11 +218,9 @@ def test_a_bag_without_any_known_base_is_incomplete(
 
 @pytest.mark.parametrize('source', MOVING)
 def test_a_bag_without_the_base_is_an_error_in_one_line(
-        source: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
-        snapshot: Snapshot) -> None:
+        source: str, tmp_path: Path, snapshot: Snapshot) -> None:
     bag = write_bag(tmp_path / 'bag', motion(5))
-    assert run(bag, parameters_of(source), tmp_path / 'a') == BAD_INPUT
-    text = capsys.readouterr().err
+    text = run(bag, parameters_of(source), tmp_path / 'a', code=BAD_INPUT).err
     assert text.count('\n') == 1
     snapshot(text)
     assert not (tmp_path / 'a' / 'out' / 'bag').exists()
@@ -236,11 +234,10 @@ def test_a_bag_without_the_base_is_an_error_in_one_line(
     ('imu', '--base-accel', '--base-accel: is not read where base.source is imu'),
     ('imu', '--combined', None)])
 def test_options_of_topics_that_are_not_read_are_errors(
-        source: str, option: str, words: str | None, tmp_path: Path,
-        capsys: pytest.CaptureFixture[str]) -> None:
+        source: str, option: str, words: str | None, tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', at_sea(source, 20))
-    assert run(bag, parameters_of(source), tmp_path / 'a', option, '/x') == BAD_INPUT
-    assert (words or '/x') in capsys.readouterr().err
+    error = run(bag, parameters_of(source), tmp_path / 'a', option, '/x', code=BAD_INPUT).err
+    assert (words or '/x') in error
 
 
 def renamed(of: list[Recorded], **names: str) -> list[Recorded]:
@@ -275,28 +272,23 @@ def test_a_setpoint_is_not_taken_from_what_is_named_as_the_base(
     snapshot('\n'.join(found['notices']))
 
 
-def test_a_pose_is_not_guessed_to_be_the_bases(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+def test_a_pose_is_not_guessed_to_be_the_bases(tmp_path: Path, snapshot: Snapshot) -> None:
     bag = write_bag(tmp_path / 'bag', renamed(at_sea('pose', 30), base_pose='/deck_pose'), **TYPES)
-    assert run(bag, parameters_of('pose'), tmp_path / 'a') == BAD_INPUT
-    snapshot(capsys.readouterr().err)
-    assert run(bag, parameters_of('pose'), tmp_path / 'b', '--base-pose', '/deck_pose',
-               '--no-report') == DONE
+    snapshot(run(bag, parameters_of('pose'), tmp_path / 'a', code=BAD_INPUT).err)
+    run(bag, parameters_of('pose'), tmp_path / 'b', '--base-pose', '/deck_pose', '--no-report')
     # one topic cannot be both
-    assert run(bag, parameters_of('pose'), tmp_path / 'c', '--base-pose',
-               f'{NODE}/{POSE}') == BAD_INPUT
-    snapshot(capsys.readouterr().err)
+    snapshot(run(bag, parameters_of('pose'), tmp_path / 'c', '--base-pose', f'{NODE}/{POSE}',
+                 code=BAD_INPUT).err)
 
 
 def test_the_only_imu_is_found_by_its_type_and_of_two_none(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
+        tmp_path: Path, snapshot: Snapshot) -> None:
     of = renamed(at_sea('imu', 30), base_imu='/deck_imu')
     replayed(of, parameters_of('imu'), tmp_path, '--no-report')
     snapshot('\n'.join(summary_of(tmp_path)['notices']))
     two = write_bag(tmp_path / 'two', [*of, ('/other/imu', RECORDED, messages.imu(0))],
                     **TYPES)
-    assert run(two, parameters_of('imu'), tmp_path / 'b') == BAD_INPUT
-    snapshot(capsys.readouterr().err)
+    snapshot(run(two, parameters_of('imu'), tmp_path / 'b', code=BAD_INPUT).err)
 
 
 def test_topics_of_a_base_that_is_fixed_are_not_used_and_this_is_said(
@@ -396,11 +388,11 @@ def test_the_output_bag_gives_the_same_output_bag(
     bag = write_bag(tmp_path / 'bag', of, **TYPES, mine=INPUT_TYPES[POSE])
     if '/mine' in options:
         monkeypatch.setattr(one_bag, '_LARGE', 0)  # written by a process of its own
-    first = run(bag, parameters, tmp_path, *options)
+    first = run(bag, parameters, tmp_path, *options, code=None).code
     monkeypatch.undo()
     assert first in (DONE, LIMIT_MET)
     again = tmp_path / 'again'
-    assert run(tmp_path / 'out' / 'bag' / 'bag', parameters, again,
-               *(each for each in options if each == '--differentiate')) == first
+    run(tmp_path / 'out' / 'bag' / 'bag', parameters, again,
+        *(each for each in options if each == '--differentiate'), code=first)
     assert summary_of(tmp_path)['setpoints'] == summary_of(again)['setpoints']
     assert all_of(tmp_path / 'out' / 'bag') == all_of(again / 'out' / 'bag')

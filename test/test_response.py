@@ -11,21 +11,20 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
+import messages
 from msgspec import convert, to_builtins
 import numpy as np
 from numpy.typing import NDArray
+from programs import call
 import pytest
 from referees import rng, ROOT
 from response_cases import EXCITATIONS, judged, NOISES
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_typestore, Stores
 from scipy import signal
 from scipy.interpolate import CubicSpline
 
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import (
     from_rotation_vector, to_quaternion, to_rotation_vector)
-from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.reference_motion.motion_functions import motion_at, sample_times
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
@@ -93,35 +92,21 @@ def write_bag(folder: Path, commanded: Motion, times: Array,
               measured: dict[str, tuple[Any, Array]],
               late: int = 0) -> Path:
     """Write setpoints, and measured messages: their writers' arguments by topic, with times."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    writers = {'pose': StampedWriter('base', 7), 'twist': StampedWriter('base', 6),
-               'accel': StampedWriter('base', 6)}
-    kinds = {'pose': POSE, 'twist': 'geometry_msgs/msg/TwistStamped',
-             'accel': 'geometry_msgs/msg/AccelStamped'}
-    rows = {'pose': np.hstack([commanded.position, to_quaternion(commanded.rotation)]),
-            'twist': commanded.rows[:, 12:18], 'accel': commanded.rows[:, 18:24]}
-    stamps = START + np.rint(times * 1e9).astype(np.int64)
-    joints = JointStateWriter(PARAMETERS['joints'])
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        for name, writer in writers.items():
-            to = bag.add_connection(f'/stewart_dynamics/setpoint/{name}', kinds[name],
-                                    typestore=store)
-            for stamp, row in zip(stamps.tolist(), rows[name].tolist(), strict=True):
-                bag.write(to, stamp, writer.write(stamp, row))
-        for topic, (values, at) in measured.items():
-            to = bag.add_connection(topic, JOINT_STATE if topic == LEGS else POSE, typestore=store)
-            for when, row in zip((START + np.rint(at * 1e9).astype(np.int64)).tolist(),
-                                 values.tolist(), strict=True):
-                data = (joints.write(when, row, [0.0] * 6, None) if topic == LEGS
-                        else writers['pose'].write(when, row))
-                bag.write(to, when + late, data)
-    return folder
+    def stamps(at: Array) -> NDArray[np.int64]:
+        return START + np.rint(at * 1e9).astype(np.int64)
+
+    poses, of = StampedWriter('base', 7), [*messages.setpoints(stamps(times), commanded)]
+    for topic, (values, at) in measured.items():
+        of += [(topic, when + late, data) for _, when, data in (
+            messages.leg_states(stamps(at), PARAMETERS['joints'], values, None, None)
+            if topic == LEGS else ((topic, when, poses.write(when, row)) for when, row in zip(
+                stamps(at).tolist(), values.tolist(), strict=True)))]
+    return messages.write_bag(folder, of)
 
 
 def replayed(bag: Path, output: Path, *options: str, code: int = 0,
              params: Path = PARAMS) -> dict[str, Any]:
-    assert main([str(bag), '--params', str(params), '--response', '--output', str(output),
-                 *options]) == code
+    call(main, bag, '--params', params, '--response', '--output', output, *options, code=code)
     found: dict[str, Any] = json.loads((output / bag.name / 'summary.json').read_text())
     return found
 
@@ -319,8 +304,8 @@ def test_setpoints_and_achieved_poses_in_tables_share_a_clock(
         np.savetxt(path, given, '%.12g', ',', comments='', header='t,x,y,z,qx,qy,qz,qw,vx,vy,vz,'
                    'wx,wy,wz,ax,ay,az,alx,aly,alz')
         table = table_of(tmp_path / f'{name}.txt', rows[40:], begin + at[40:])
-        assert main([str(path), '--params', str(PARAMS), '--response', '--measured-pose',
-                     str(table), '--output', str(tmp_path / 'r'), '--no-report']) == 0
+        call(main, path, '--params', PARAMS, '--response', '--measured-pose', table, '--output',
+             tmp_path / 'r', '--no-report')
         found = json.loads((tmp_path / 'r' / name / 'summary.json').read_text())['response']
         for axis in AXES:
             assert abs(found[axis]['delay'] - DRIVE.late) < 1e-4
@@ -348,8 +333,7 @@ def test_legs_without_efforts_are_compared_only_by_position(
     ['--measured-pose', TRACKER], ['--response', '--measured', LEGS, '--measured-pose', TRACKER]])
 def test_options_that_do_not_fit_are_rejected(
         options: list[str], followed: Path, tmp_path: Path) -> None:
-    with pytest.raises(SystemExit, match='2'):
-        main([str(followed), '--params', str(PARAMS), '--output', str(tmp_path), *options])
+    call(main, followed, '--params', PARAMS, '--output', tmp_path, *options, code=2)
 
 
 def test_clocks_that_differ_are_said(

@@ -12,6 +12,7 @@ import stat
 import subprocess
 import sys
 
+from programs import call
 import pytest
 from referees import ROOT
 from snapshot import Snapshot
@@ -172,11 +173,9 @@ def test_a_file_of_the_user_with_the_name_of_a_design_is_not_replaced(
 
 @pytest.mark.parametrize('main', [each.main for each in (
     calibration, datasheet, description, export, identification, replay)])
-def test_an_empty_folder_is_not_the_current_one(
-        main: Callable[[list[str]], int], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit, match='^2$'):
-        main(['--output', ''])
-    assert capsys.readouterr().err.endswith("error: argument --output: '': must name a folder\n")
+def test_an_empty_folder_is_not_the_current_one(main: Callable[[list[str]], int]) -> None:
+    assert call(main, '--output', '', code=2).err.endswith(
+        "error: argument --output: '': must name a folder\n")
 
 
 @pytest.mark.parametrize('other', [

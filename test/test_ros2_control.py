@@ -21,6 +21,7 @@ from crank_machines import random_machine, random_state
 from crank_platforms import motion_of, parameters_of
 from governed import limited_hexapod
 import numpy as np
+from programs import run_program
 import pytest
 from referees import Array, random_motion, random_wrench, rng
 from stewart_dynamics import Parameters, StewartPlatform
@@ -59,8 +60,8 @@ def test_feed_forward(c: str, cpp: str, tmp_path: Path) -> None:
         *checked, f'-I{C_SOURCE}', f'-I{PACKAGE / "include"}', tmp_path / 'c.o',
         PACKAGE / 'src' / 'feed_forward.cpp', PACKAGE / 'test' / 'feed_forward_test.cpp',
         '-o', program], check=True)
-    done = subprocess.run([program], capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (0, 'all checks passed\n')
+    done = run_program(program)
+    assert done.out == 'all checks passed\n'
 
 
 def test_parameters_are_those_of_the_node() -> None:
@@ -353,9 +354,8 @@ def test_headings_and_branches_of_home_have_the_bits_of_the_node(program: Path) 
 def test_rules_of_cranks_in_one_line(
         program: Path, changes: dict[str, Any], message: str) -> None:
     p = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
-    done = subprocess.run([program], input=as_text(p, changes) + '0', capture_output=True,
-                          text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (1, '', f'{message}\n')
+    done = run_program(program, code=1, text=as_text(p, changes) + '0')
+    assert (done.out, done.err) == ('', f'{message}\n')
 
 
 @pytest.mark.parametrize(('changes', 'message'), [
@@ -406,9 +406,8 @@ def test_rules_in_one_line(program: Path, changes: dict[str, Any], message: str)
     """A rule that is broken is named with its parameter, and the leg; nothing is computed."""
     p = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
     bare: dict[str, Any] = {'drive.torque_max': [], 'actuator.screw_lead': []}
-    done = subprocess.run([program], input=as_text(p, bare | changes) + '0', capture_output=True,
-                          text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (1, '', f'{message}\n')
+    done = run_program(program, code=1, text=as_text(p, bare | changes) + '0')
+    assert (done.out, done.err) == ('', f'{message}\n')
 
 
 LEGS, LIVE = 'leg_feed_forward.yaml', 'platform_feed_forward.yaml'
@@ -449,10 +448,9 @@ def test_example_is_the_hexapod_of_the_node(file: str) -> None:
 def test_colcon_finds_both_packages_as_documented() -> None:
     """``--base-paths . ros2_control`` is needed, and enough; versions are equal."""
     def found(*folders: str) -> list[str]:
-        done = subprocess.run(
-            [sys.executable, '-m', 'colcon', '--log-base', '/dev/null', 'list', '--names-only',
-             '--base-paths', *folders], cwd=ROOT, capture_output=True, text=True, check=True)
-        return done.stdout.split()
+        done = run_program(sys.executable, '-m', 'colcon', '--log-base', '/dev/null', 'list',
+                           '--names-only', '--base-paths', *folders, folder=ROOT)
+        return done.out.split()
 
     pytest.importorskip('colcon_core')
     assert found('.') == ['stewart_dynamics']

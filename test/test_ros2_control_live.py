@@ -11,16 +11,16 @@ import subprocess
 from typing import Any, NamedTuple
 
 from governed import (
-    Array, CRANK_DEMANDS, CRANK_KINDS, CRANKS, DEMANDS, KINDS, limited_cranks, limited_hexapod,
-    random_demand)
+    Array, CRANK_DEMANDS, CRANK_KINDS, CRANKS, DEMANDS, governable, KINDS, limited_cranks,
+    limited_hexapod, random_demand)
 from independent_limits import exceedances
 from messages import imu
 import numpy as np
+from programs import run_program
 import pytest
 from referees import random_motion, rng
 from stewart_dynamics import GovernedStream, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.core.binding import CODES, function, record
-from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
 from stewart_dynamics.mechanics.rows import NO_BASE
@@ -116,13 +116,7 @@ def test_no_limit_is_exceeded_by_any_setpoint(program: Path, wanted: str) -> Non
     random = np.random.default_rng([7, DEMANDS.index(wanted)])
     checked = 0
     for kind in KINDS:
-        while True:
-            p, axes = limited_hexapod(random, kind)
-            try:
-                GovernedStream(p)
-                break
-            except ParameterError:  # home is not within such limits
-                continue
+        p, axes, _ = governable(random, kind, limited_hexapod)
         stamps, demand = from_home(p, *random_demand(random, wanted, p, 1100))
         found, motion = governed_within_limits(program, p, axes, stamps, demand, kind)
         # These are the commands: no position is clipped, no effort either.
@@ -140,13 +134,7 @@ def test_no_limit_of_cranks_is_exceeded_by_any_setpoint(program: Path, kind: str
     place = CRANK_KINDS.index(kind)
     random = np.random.default_rng([8, place])
     for wanted in CRANK_DEMANDS[place % 3:-1:3]:  # without numbers that are not finite
-        while True:
-            try:
-                p, axes = limited_cranks(random, kind)
-                GovernedStream(p)
-                break
-            except ParameterError:  # home is not within such limits
-                continue
+        p, axes, _ = governable(random, kind, limited_cranks)
         stamps, demand = from_home(p, *random_demand(random, wanted, p, 200))
         found, motion = governed_within_limits(program, p, axes, stamps, demand, wanted)
         result = StewartPlatform(p).inverse_dynamics(motion)
@@ -252,8 +240,8 @@ def test_rules_of_cranks_in_one_line(program: Path, changes: dict[str, Any], mes
 
 def assert_rule(program: Path, p: Parameters, changes: dict[str, Any], message: str) -> None:
     given = as_text(p, {'reference': 'platform', 'governor': True, **changes})
-    done = subprocess.run([program], input=given + '0 1', capture_output=True, text=True)
-    assert (done.returncode, done.stdout, done.stderr) == (1, '', f'{message}\n')
+    done = run_program(program, code=1, text=given + '0 1')
+    assert (done.out, done.err) == ('', f'{message}\n')
 
 
 SHIP = Parameters.from_yaml(ROOT / 'config' / 'ship_hexapod.yaml')

@@ -27,6 +27,7 @@ import time
 from typing import Any
 from xml.etree import ElementTree
 
+from programs import run_program
 import pytest
 
 pytest.importorskip('rclpy')
@@ -728,10 +729,8 @@ def test_keys_are_private_and_never_overwritten(keys: Callable[..., Path]) -> No
                  folder / name / 'cert.pem'], check=False, capture_output=True)
             assert (checked.returncode == 0) == (purpose == good_for), (name, purpose)
     before = {path: path.read_bytes() for path in files}
-    again = subprocess.run([SECURITY / 'make_keys.sh', folder, 'source=127.0.0.1:7001'],
-                           check=False, capture_output=True, text=True)
-    assert again.returncode == 2
-    assert again.stderr == f'make_keys.sh: {folder}: exists; keys are never overwritten\n'
+    again = run_program(SECURITY / 'make_keys.sh', folder, 'source=127.0.0.1:7001', code=2)
+    assert again.err == f'make_keys.sh: {folder}: exists; keys are never overwritten\n'
     assert {path: path.read_bytes() for path in folder.rglob('*') if path.is_file()} == before
 
 
@@ -748,9 +747,7 @@ def test_keys_are_private_and_never_overwritten(keys: Callable[..., Path]) -> No
 def test_invalid_peers_of_make_keys_are_rejected(
         tmp_path: Path, peers: list[str], snapshot: Snapshot) -> None:
     """The error is one line, and no file is left."""
-    done = subprocess.run([SECURITY / 'make_keys.sh', tmp_path / 'keys', *peers], check=False,
-                          capture_output=True, text=True)
-    assert done.returncode == 2
-    line, = done.stderr.splitlines()
+    done = run_program(SECURITY / 'make_keys.sh', tmp_path / 'keys', *peers, code=2)
+    line, = done.err.splitlines()
     snapshot(line)
     assert not list(tmp_path.iterdir())

@@ -11,11 +11,10 @@ import math
 from pathlib import Path
 import re
 import shlex
-import subprocess
-import sys
 from typing import Any, NamedTuple
 
 import numpy as np
+from programs import run_program
 import pytest
 from referees import ROOT
 from stewart_dynamics import Motion, Parameters, StewartPlatform
@@ -63,12 +62,11 @@ def run(command: str, folder: Path) -> str:
     """Run a command of the page, with its redirection; return its output."""
     line, _, file = command.partition(' > ')
     program, *arguments = shlex.split(line)
-    done = subprocess.run([Path(sys.executable).with_name(program), *arguments], cwd=folder,
-                          capture_output=True, text=True, timeout=300, check=True)
-    assert 'warning' not in done.stderr
+    done = run_program(program, *arguments, folder=folder)
+    assert 'warning' not in done.err
     if file:
-        (folder / file).write_text(done.stdout, encoding='utf-8')
-    return done.stdout
+        (folder / file).write_text(done.out, encoding='utf-8')
+    return done.out
 
 
 def test_all_of_the_page_is_run() -> None:

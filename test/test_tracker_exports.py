@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from programs import call
 import pytest
 from referees import ROOT
 from scipy.spatial.transform import Rotation
@@ -165,11 +166,10 @@ def test_other_axes_than_those_of_the_tracker(tmp_path: Path) -> None:
 @WRITERS
 def test_a_replay_tells_what_is_read(
         write: Writer, name: str, options: dict[str, object], tmp_path: Path,
-        capsys: pytest.CaptureFixture[str], snapshot: Snapshot) -> None:
-    path = write(tmp_path / name, **options)
-    assert replay([str(path), '--params', str(PARAMS), '--output', str(tmp_path / 'r'),
-                   '--no-report', '--differentiate']) == 0
-    for line in capsys.readouterr().out.splitlines():
+        snapshot: Snapshot) -> None:
+    out = call(replay, write(tmp_path / name, **options), '--params', PARAMS, '--output',
+               tmp_path / 'r', '--no-report', '--differentiate').out
+    for line in out.splitlines():
         if 'file of ' in line or 'lost' in line:
             snapshot(line)
 

@@ -12,6 +12,7 @@ from typing import Any
 from legs_of_all_kinds import efforts_of, KINDS, random_hexapod
 from msgspec import to_builtins
 import numpy as np
+from programs import call
 import pytest
 from referees import ROOT
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
@@ -171,10 +172,9 @@ def test_limits_of_motors_are_counted() -> None:
     assert counted['drive.torque_max'] == 50
 
 
-def test_replay_states_bands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_replay_states_bands(tmp_path: Path) -> None:
     arguments = [str(ROOT / 'bags' / 'clear'), '--params', str(PLATFORM), '--output']
-    assert main([*arguments, str(tmp_path / 'with'), '--uncertainty', '20']) == 0
-    text = capsys.readouterr().out
+    text = call(main, *arguments, tmp_path / 'with', '--uncertainty', '20').out
     assert 'in 95 % of 20 hexapods that the file admits' in text
     assert 'limits.force_max is held in all 20 hexapods that the file admits' in text
     assert 'uncertainty.* are not given: the defaults are weak' in text
@@ -188,7 +188,7 @@ def test_replay_states_bands(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     page = (folder / 'report.html').read_text()
     assert '<section id="uncertainty">' in page
     assert 'on the hexapods that the file admits' in page
-    assert main([*arguments, str(tmp_path / 'without')]) == 0
+    call(main, *arguments, tmp_path / 'without')
     plain = json.loads((tmp_path / 'without' / 'clear' / 'summary.json').read_text())
     assert plain['uncertainty'] is None
     assert plain['legs'] == summary['legs']

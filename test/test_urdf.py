@@ -7,13 +7,13 @@
 import os
 from pathlib import Path
 import shutil
-import subprocess
 import sys
 from typing import Any
 from xml.etree import ElementTree as ET
 
 from legs_of_all_kinds import efforts_of, KINDS, random_hexapod
 import numpy as np
+from programs import run_program
 import pytest
 from referees import (
     Array, each_relative, friction, random_parameters, reflected, rng,
@@ -149,10 +149,9 @@ def test_urdfdom_reads_the_urdf(tmp_path):
     file = tmp_path / 'hexapod.urdf'
     file.write_text(urdf(Hexapod(Parameters.from_yaml(PLATFORM)), 'hexapod',
                          Ros2Control(['effort'], 'mock')), encoding='utf-8')
-    done = subprocess.run([CHECK_URDF, str(file)], capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0
-    assert 'root Link: base has 7 child(ren)' in done.stdout
-    assert 'error' not in (done.stdout + done.stderr).lower()
+    done = run_program(CHECK_URDF, file)
+    assert 'root Link: base has 7 child(ren)' in done.out
+    assert 'error' not in (done.out + done.err).lower()
 
 
 def test_all_links_have_their_mass_and_inertia_zeros_too():
