@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing, ExitStack
 import gc
+import importlib
 from importlib.util import find_spec
 from itertools import count
 import os
@@ -15,6 +16,8 @@ from pathlib import Path
 import re
 import shutil
 import signal
+import sys
+from types import ModuleType
 from typing import Any, TYPE_CHECKING
 
 from hypothesis import settings
@@ -178,6 +181,32 @@ def browser() -> Iterator[Browser]:
         running = driver.chromium.launch(executable_path=found, args=FLAGS, timeout=300_000.0)
         yield running
         running.close()
+
+
+@pytest.fixture(scope='module')
+def demo(request: pytest.FixtureRequest) -> ModuleType:
+    """Return the module of demo/ that is the test module's DEMO."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(Path(__file__).parents[1] / 'demo'))
+        return importlib.import_module(request.module.DEMO)
+
+
+@pytest.fixture
+def rejects(demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+            snapshot: Snapshot) -> Callable[..., None]:
+    """Return a function that checks that the demo rejects options in one line."""
+    def run(*options: object) -> None:
+        for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):
+            monkeypatch.setenv(name, '1')  # main sets missing ones
+        monkeypatch.setattr(sys, 'argv', [demo.__name__, '--output', str(tmp_path / 'out'),
+                                          *map(str, options)])
+        # A text as exit code is printed as a line, with exit code 1.
+        with pytest.raises(SystemExit, match=f'^demo-{demo.__name__}: [^\n]*$') as ended:
+            demo.main()
+        assert isinstance(ended.value.code, str)
+        snapshot(ended.value.code)
+
+    return run
 
 
 @pytest.fixture(scope='session')

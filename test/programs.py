@@ -18,7 +18,7 @@ TIMEOUT = 300.0  # [s]
 
 
 class Ended(NamedTuple):
-    """A program that has ended: its exit code and what it has printed."""
+    """The exit code and the output of a program that has ended."""
 
     code: object
     out: str

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from referees import rng
+from referees import rng, ROOT
 from scipy.spatial.transform import Rotation
 from snapshot import Snapshot
 from stewart_dynamics import (
@@ -17,8 +17,10 @@ from stewart_dynamics import (
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability import motions
 from stewart_dynamics.capability.motions import Deviations, faster
+from stewart_dynamics.planned.interpolation import Interpolation
 from test_capability_boxes import PLATFORM
 
+CRANKS = ROOT / 'config' / 'crank_platform.yaml'
 HOME = Motion.from_pose(PLATFORM.home_pose())
 TIMES: Array = np.linspace(0.0, 4.0, 201, dtype=np.float64)
 
@@ -101,33 +103,60 @@ def test_a_motion_as_large_as_it_can_be_reaches_its_limit(seed: int) -> None:
     assert found.limit in ('length_min', 'length_max', 'velocity_max', 'force_max')
 
 
+def motion_of_cranks(seed: int, times: Array, home: Pose) -> Motion:
+    """Return harmonic displacements from home."""
+    random = rng(seed)
+    first, third = random.uniform(-1.0, 1.0, (2, 6)) * 0.03
+    phase = random.uniform(0.0, 6.0, (2, 6))
+    angles = [3.0 * times[:, None] + phase[0], 9.0 * times[:, None] + phase[1]]
+    x = first * np.sin(angles[0]) + third / 3.0 * np.sin(angles[1])
+    dx = 3.0 * (first * np.cos(angles[0]) + third * np.cos(angles[1]))
+    ddx = -9.0 * (first * np.sin(angles[0]) + 3.0 * third * np.sin(angles[1]))
+    return Motion(home.position + x[:, :3], home.rotation, dx[:, :3], np.zeros(3), ddx[:, :3],
+                  np.zeros(3))
+
+
 @pytest.mark.parametrize('ask', ['speed', 'amplitude', 'payload'])
-def test_with_times_the_motion_between_the_samples_counts(ask: str) -> None:
-    """Ten samples find the limit that many find, and a planned trajectory keeps it."""
-    platform = StewartPlatform(PLATFORM.parameters.replaced({'limits.velocity_max': 0.3}))
-    capability, few = Capability(platform), TIMES[::20]
-    given = motion(3, few)
+@pytest.mark.parametrize(('kind', 'seed'), [('telescopic', 3), *(('crank', n) for n in range(3))])
+def test_with_times_the_motion_between_the_samples_counts(kind: str, seed: int, ask: str) -> None:
+    """Few samples find the limit that many find, and a planned trajectory keeps it."""
+    if kind == 'crank':
+        platform, times = StewartPlatform.from_yaml(CRANKS), np.linspace(0.0, 2.0, 9)
+        center = platform.home_pose()
+        given = motion_of_cranks(seed, times, center)
+    else:
+        platform = StewartPlatform(PLATFORM.parameters.replaced({'limits.velocity_max': 0.3}))
+        times = TIMES[::20]
+        given = motion(seed, times)
+        center = given.pose[0]
+    capability = Capability(platform)
 
-    def found(times: Array | None) -> Any:
+    def found(of: Motion, times: Array | None) -> Any:
         if ask == 'speed':
-            return capability.speed_factor(given, times=times)
+            return capability.speed_factor(of, times=times)
         if ask == 'amplitude':
-            return capability.amplitude_factor(given, times=times)
-        return capability.payload(given, [0.1, 0.2, 0.3], times=times)
+            return capability.amplitude_factor(of, center, times=times)
+        return capability.payload(of, [0.1, 0.2, 0.3], times=times)
 
-    between, samples = found(few), found(None)
-    assert between.value < samples.value
-    assert few[between.sample] <= between.time <= few[between.sample + 1]
+    between, samples = found(given, times), found(given, None)
+    assert 0.0 < between.value <= samples.value
+    assert kind == 'crank' or between.value < samples.value
+    assert times[between.sample] <= between.time <= times[between.sample + 1]
+    whole, count = Interpolation(np.diff(times), given.rows), len(times) - 1
+    where = np.append(np.arange(0.0, count, 1.0 / 512.0), count)
+    which = np.minimum(where.astype(np.int64), count - 1)
+    dense = found(Motion.of_rows(whole.at(which, where - which)), None)
+    assert between.value == pytest.approx(dense.value, rel=2e-4)
     if ask == 'payload':
         return
     for factor in (1.0 - 2e-3, 1.0 + 2e-3):
         k = factor * between.value
-        rows, times = given.rows, few
+        rows, at = given.rows, times
         if ask == 'speed':
-            rows, times = faster(rows, k), few / k
+            rows, at = faster(rows, k), times / k
         else:
-            rows = Deviations(Motion.from_pose(given.pose[0]), rows).at(k)
-        accepted = check_planned_trajectory(platform, times, Motion.of_rows(rows)).accepted
+            rows = Deviations(Motion.from_pose(center), rows).at(k)
+        accepted = check_planned_trajectory(platform, at, Motion.of_rows(rows)).accepted
         assert accepted == (factor < 1.0)
 
 

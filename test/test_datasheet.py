@@ -13,13 +13,12 @@ import math
 from pathlib import Path
 import re
 import shutil
-import sys
 from typing import Any
 from urllib.parse import unquote
 
 import messages
 import numpy as np
-from programs import call, run_program
+from programs import call
 import pytest
 from referees import random_direction, rng, rotation_about
 
@@ -640,14 +639,6 @@ def test_the_payload_of_a_base_that_turns_is_that_of_any_orientation(
 
 def test_results_are_replaced_only_by_option(sheet: Path, snapshot: Snapshot) -> None:
     snapshot(call(main, '--params', PLATFORM, '--output', sheet, code=2).err)
-
-
-def test_help_needs_no_numpy() -> None:
-    code = ('import sys; from stewart_dynamics.datasheet import main\n'
-            'try: main(["--help"])\n'
-            'except SystemExit: print("numpy" in sys.modules)')
-    done = run_program(sys.executable, '-c', code, code=None)
-    assert done.out.endswith('False\n')
 
 
 @pytest.mark.parametrize(('value', 'text'), [

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-import importlib
+from collections.abc import Callable
 from pathlib import Path
 import re
 import sys
@@ -14,7 +14,6 @@ from types import ModuleType
 import numpy as np
 import pytest
 from running import log_lines, PLATFORM, Program, ROOT
-from snapshot import Snapshot
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identification_results import document
@@ -23,13 +22,7 @@ from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.reference_motion.motion_functions import motion_at
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 
-
-@pytest.fixture(scope='module')
-def demo() -> ModuleType:
-    """Return the demo as a module."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(ROOT / 'demo'))
-        return importlib.import_module('identify')
+DEMO = 'identify'
 
 
 def states_of(parameters: Parameters, motion: Motion, stamps: np.ndarray) -> list[bytes]:
@@ -66,20 +59,8 @@ def test_the_demo_identifies_the_true_parameters(demo: ModuleType, tmp_path: Pat
 
 @pytest.mark.parametrize('option', ['--params', '--motion', '--recorded'])
 def test_a_run_with_bad_options_is_rejected_in_one_line(
-        demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str,
-        snapshot: Snapshot) -> None:
-    for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):
-        monkeypatch.setenv(name, '1')  # main sets missing ones
-    value = '0.5' if option == '--recorded' else 'nowhere.yaml'
-    monkeypatch.setattr(sys, 'argv', [
-        'identify.py', '--output', str(tmp_path / 'out'), option, value])
-    with pytest.raises(SystemExit) as ended:
-        demo.main()
-    line = ended.value.code
-    assert isinstance(line, str)
-    assert line.startswith('demo-identify: ')
-    assert '\n' not in line
-    snapshot(line)
+        rejects: Callable[..., None], option: str) -> None:
+    rejects(option, '0.5' if option == '--recorded' else 'nowhere.yaml')
 
 
 # The demo of the README: the real node on a recorded motion, and the table of its answers

@@ -5,11 +5,10 @@
 """The command stewart_describe: its files, messages and exit codes."""
 
 from pathlib import Path
-import sys
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from programs import call, run_program
+from programs import call
 import pytest
 
 from stewart_dynamics import Parameters
@@ -111,13 +110,6 @@ def test_bad_input_is_exit_code_2_and_one_line(arguments, tmp_path, snapshot):
     ['--params', 'a', '--ros2-control', 'torque']])
 def test_wrong_arguments_are_explained(arguments):
     assert 'usage: stewart_describe' in call(main, *arguments, code=2).err
-
-
-def test_help_needs_no_numpy():
-    code = ('import sys; from stewart_dynamics.description import main\n'
-            'try: main(["--help"])\n'
-            'except SystemExit: print("numpy" in sys.modules)')
-    assert run_program(sys.executable, '-c', code).out.endswith('False\n')
 
 
 def test_joints_on_circles_are_written_as_points(tmp_path):

@@ -74,6 +74,13 @@ def status(diagnostics: DynamicsDiagnostics, name: str, now: float) -> Status:
     return next(each for each in report(diagnostics, now) if each.name == name)
 
 
+def stated(snapshot: Snapshot, level: int, of: Status) -> Status:
+    """Check level and words of a status, and return it."""
+    assert of.level == level
+    snapshot(of.message)
+    return of
+
+
 def report(diagnostics: DynamicsDiagnostics, now: float) -> list[Status]:
     return diagnostics.report(now)[0]
 
@@ -101,9 +108,7 @@ def test_a_silent_topic_is_named_and_since_when(silent: str, snapshot: Snapshot)
         for topic in TOPICS:
             if topic != silent:
                 diagnostics.setpoints.heard[topic] = now
-    of = status(diagnostics, 'setpoints', BEGIN + 2.5)
-    assert of.level == STALE
-    snapshot(of.message)
+    of = stated(snapshot, STALE, status(diagnostics, 'setpoints', BEGIN + 2.5))
     assert not any(topic in of.message for topic in TOPICS if topic != silent)
     assert dict(of.values)[f'{silent}: last heard (s ago)'] == '2.500'
     assert dict(of.values)['age of the last (s)'] == '2.500'
@@ -225,9 +230,7 @@ def test_rejections_are_counted_with_their_reason_and_are_a_warning(snapshot: Sn
     for _ in range(3):
         diagnostics.rejected(Rejection(TWIST, NOT_FINITE), '(nan, 0.0)', BEGIN)
     diagnostics.rejected(Rejection(POSE, TWICE), 'stamp 5 ns', BEGIN)
-    of = status(diagnostics, 'setpoints', BEGIN + 0.01)
-    assert of.level == WARN
-    snapshot(of.message)
+    of = stated(snapshot, WARN, status(diagnostics, 'setpoints', BEGIN + 0.01))
     assert dict(of.values)[f'rejected, {TWIST}: {NOT_FINITE}'] == '3'
     assert dict(of.values)[f'rejected, {POSE}: {TWICE}'] == '1'
     # the warning ends, the count stays
@@ -270,9 +273,7 @@ def test_the_status_names_the_rejection_if_all_messages_are_rejected(snapshot: S
     for topic in TOPICS:
         diagnostics.setpoints.heard[topic] = BEGIN
     diagnostics.rejected(Rejection(POSE, NOT_FINITE), 'nan', BEGIN)
-    of = status(diagnostics, 'setpoints', BEGIN + 0.01)
-    assert of.level == STALE
-    snapshot(of.message)
+    stated(snapshot, STALE, status(diagnostics, 'setpoints', BEGIN + 0.01))
 
 
 # Timing
@@ -283,9 +284,7 @@ def test_processing_times_are_those_of_the_last_seconds(snapshot: Snapshot) -> N
         OK, 'no setpoint yet', [('dropped', '0'), ('incomplete', '0')])
     for took in (100e-6, 900e-6, 200e-6):
         answered(diagnostics, BEGIN, took=took)
-    of = status(diagnostics, 'timing', BEGIN)
-    assert of.level == OK
-    snapshot(of.message)
+    of = stated(snapshot, OK, status(diagnostics, 'timing', BEGIN))
     assert of.values[:2] == [
         ('processing time, median (us)', '200'), ('processing time, largest (us)', '900')]
     for second in (1.0, 2.0, 3.0):
@@ -305,13 +304,9 @@ def test_a_backlog_is_a_warning_for_a_second_and_its_losses_stay_counted(
     diagnostics.rejected(Rejection(POSE, NOT_JOINED), 'stamp 3 ns', BEGIN)
     diagnostics.rejected(Rejection(POSE, TWICE), 'stamp 4 ns', BEGIN)
     answered(diagnostics, BEGIN + 0.5)
-    of = status(diagnostics, 'timing', BEGIN + 0.5)
-    assert of.level == WARN
-    snapshot(of.message)
+    of = stated(snapshot, WARN, status(diagnostics, 'timing', BEGIN + 0.5))
     answered(diagnostics, BEGIN + 1.5)
-    of = status(diagnostics, 'timing', BEGIN + 1.5)
-    assert of.level == OK
-    snapshot(of.message)
+    of = stated(snapshot, OK, status(diagnostics, 'timing', BEGIN + 1.5))
     assert of.values[-2:] == [('dropped', '3'), ('incomplete', '1')]
 
 
@@ -402,9 +397,7 @@ def test_a_warning_states_its_reason_with_its_own_numbers(
     answered(diagnostics, BEGIN, changed(
         result__condition_number=condition,
         warning=Singularity(cause=cause, time_to_crossing=time, crossings=4)))
-    of = status(diagnostics, 'singularity', BEGIN)
-    assert of.level == WARN
-    snapshot(of.message)
+    of = stated(snapshot, WARN, status(diagnostics, 'singularity', BEGIN))
     assert dict(of.values)['time to crossing (s)'] == f'{time:.3f}'
     assert dict(of.values)['crossings'] == '4'
     answered(diagnostics, BEGIN + 2.0)
@@ -423,9 +416,7 @@ def test_a_past_state_is_reported_with_its_own_number_and_since_when(snapshot: S
     diagnostics = begun()
     answered(diagnostics, BEGIN, near(23.5))
     answered(diagnostics, BEGIN + 0.4, changed(result__condition_number=7.42))
-    of = status(diagnostics, 'singularity', BEGIN + 0.4)
-    assert of.level == WARN
-    snapshot(of.message)
+    of = stated(snapshot, WARN, status(diagnostics, 'singularity', BEGIN + 0.4))
     assert dict(of.values)['condition number'] == '7.42'
     assert status(diagnostics, 'singularity', BEGIN + 1.0).message.startswith('clear')
 
@@ -460,9 +451,7 @@ def test_a_crossing_inside_stop_condition_hides_nothing_and_is_not_hidden(
     logged(diagnostics, BEGIN)
     assert answered(diagnostics, BEGIN + 0.01, changed(
         inside, 1, warning=Singularity(cause=Cause.CROSSED, stopped=True)))
-    of = status(diagnostics, 'singularity', BEGIN + 0.01)
-    assert of.level == ERROR
-    snapshot(of.message)
+    stated(snapshot, ERROR, status(diagnostics, 'singularity', BEGIN + 0.01))
 
 
 def test_hundreds_of_crossings_are_one_line_in_a_second_with_their_number(
@@ -483,9 +472,7 @@ def test_hundreds_of_crossings_are_one_line_in_a_second_with_their_number(
 def test_a_pose_that_cannot_be_solved_is_an_error(setpoint: Batch, snapshot: Snapshot) -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, outputs_of(setpoint))
-    of = status(diagnostics, 'singularity', BEGIN)
-    assert of.level == ERROR
-    snapshot(of.message)
+    stated(snapshot, ERROR, status(diagnostics, 'singularity', BEGIN))
     # and no force is named among the legs' values
     assert not any('force' in key for key, _ in status(diagnostics, 'limits', BEGIN).values)
 
@@ -508,9 +495,7 @@ def test_the_worst_condition_is_kept_for_a_second_or_two() -> None:
 def test_held_limits_are_ok(snapshot: Snapshot) -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
-    of = status(diagnostics, 'limits', BEGIN)
-    assert of.level == OK
-    snapshot(of.message)
+    of = stated(snapshot, OK, status(diagnostics, 'limits', BEGIN))
     values = dict(of.values)
     for leg, name in enumerate(PARAMETERS['joints']):
         assert values[f'{name}: length (m)'] == f'{CLEAR.drive_positions[0, leg]:.6g}'

@@ -22,6 +22,7 @@ from stewart_dynamics.possible_errors.hypothesis import PossibleError
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.input_messages import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
 from stewart_dynamics.setpoints.rejections import NOT_MEASURED, Rejection, Rejections
+from test_diagnostics import stated
 from test_external_wrench import (
     BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, UNFILTERED)
 
@@ -91,9 +92,7 @@ def test_the_status_of_the_wrench_is_the_last() -> None:
 def test_the_status_has_force_and_moment(snapshot: Snapshot) -> None:
     diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     felt(diagnostics, 1.0)
-    now = status(diagnostics, 1.05)
-    assert now.level == OK
-    snapshot(now.message)
+    now = stated(snapshot, OK, status(diagnostics, 1.05))
     values = dict(now.values)
     assert CLEAR.wrench is not None
     assert CLEAR.differences is not None
@@ -130,9 +129,7 @@ def test_an_overload_is_an_error_and_held_for_a_second(snapshot: Snapshot) -> No
     felt(diagnostics, 1.0)
     assert status(diagnostics, 1.0).level == OK
     felt(diagnostics, 1.01, OVER)
-    now = status(diagnostics, 1.01)
-    assert now.level == ERROR
-    snapshot(now.message)
+    stated(snapshot, ERROR, status(diagnostics, 1.01))
     felt(diagnostics, 1.5)
     assert status(diagnostics, 1.5).level == ERROR
     felt(diagnostics, 2.02)
@@ -143,9 +140,7 @@ def test_silence_is_stale(snapshot: Snapshot) -> None:
     diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     felt(diagnostics, 1.0)
     assert status(diagnostics, 1.09).level == OK
-    now = status(diagnostics, 3.5)
-    assert now.level == STALE
-    snapshot(now.message)
+    stated(snapshot, STALE, status(diagnostics, 3.5))
     felt(diagnostics, 4.0)
     assert status(diagnostics, 4.0).level == OK
 
@@ -154,9 +149,7 @@ def test_measurements_that_are_too_far_apart_are_stale(snapshot: Snapshot) -> No
     diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     for now in (1.0, 1.5, 2.0):
         felt(diagnostics, now, FIRST)
-    of = status(diagnostics, 2.0)
-    assert of.level == STALE
-    snapshot(of.message)
+    of = stated(snapshot, STALE, status(diagnostics, 2.0))
     assert 'force (N)' not in dict(of.values)
     assert 'distance from the last setpoint (m)' in dict(of.values)
 
@@ -165,9 +158,7 @@ def test_a_rejection_is_reported_and_counted(snapshot: Snapshot) -> None:
     diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     felt(diagnostics, 1.0)
     diagnostics.rejected(Rejection(MEASURED_LEGS, MISSING_JOINTS), 'leg_6', 1.01)
-    now = status(diagnostics, 1.02)
-    assert now.level == WARN
-    snapshot(now.message)
+    now = stated(snapshot, WARN, status(diagnostics, 1.02))
     assert dict(now.values)['rejected, measured_legs: lacks one of the joints'] == '1'
     (level, text), = logged(diagnostics, 1.02)
     assert level == WARN
@@ -175,9 +166,7 @@ def test_a_rejection_is_reported_and_counted(snapshot: Snapshot) -> None:
     for n in range(10):
         diagnostics.heard(1.1 + 0.1 * n)
         diagnostics.rejected(Rejection(MEASURED_LEGS, MISSING_JOINTS), 'leg_6', 1.1 + 0.1 * n)
-    now = status(diagnostics, 2.0)
-    assert now.level == STALE
-    snapshot(now.message)
+    now = stated(snapshot, STALE, status(diagnostics, 2.0))
     assert dict(now.values)['rejected, measured_legs: lacks one of the joints'] == '11'
 
 
@@ -213,9 +202,7 @@ def test_rejections_after_an_overload_are_named(snapshot: Snapshot) -> None:
     felt(diagnostics, 1.0, OVER)
     diagnostics.heard(1.5)
     diagnostics.rejected(Rejection(MEASURED_LEGS, MISSING_JOINTS), 'leg_6', 1.5)
-    now = status(diagnostics, 1.5)
-    assert now.level == STALE
-    snapshot(now.message)
+    stated(snapshot, STALE, status(diagnostics, 1.5))
 
 
 # The diagnostics of the base: levels, words and log lines, at chosen times

@@ -19,10 +19,9 @@ import pytest
 from referees import random_direction, rng, ROOT, rotation_about
 from scipy.interpolate import CubicHermiteSpline
 from stewart_dynamics import (
-    approach, BaseMotion, Capability, check_planned_trajectory, Motion, MotionError, Parameters,
+    approach, BaseMotion, check_planned_trajectory, Motion, MotionError, Parameters,
     PlannedTrajectory, Pose, PoseError, rest_to_rest, StewartPlatform, TimedMotion)
 from stewart_dynamics.arrays import Array, NO_WRENCH
-from stewart_dynamics.capability.motions import Deviations, faster
 from stewart_dynamics.mechanics.batch import lever_squares, missing_distances
 from stewart_dynamics.mechanics.kinematics.joint_angles import JointAngles
 from stewart_dynamics.mechanics.rows import (
@@ -400,50 +399,6 @@ def test_bounds_of_levers_hold_on_any_way() -> None:
         assert (least <= true + 1e-12).all()
         tight += int((least > 0.5 * true).all())
     assert tight > 3
-
-
-@pytest.mark.parametrize('ask', ['speed', 'amplitude', 'payload'])
-@pytest.mark.parametrize('seed', range(3))
-def test_with_times_the_motion_between_the_samples_counts(ask: str, seed: int) -> None:
-    """Few samples find the limit that many find, and a planned trajectory keeps it."""
-    random, times = rng(seed), np.linspace(0.0, 2.0, 9)
-    first, third = random.uniform(-1.0, 1.0, (2, 6)) * 0.03
-    phase = random.uniform(0.0, 6.0, (2, 6))
-    angles = [3.0 * times[:, None] + phase[0], 9.0 * times[:, None] + phase[1]]
-    x = first * np.sin(angles[0]) + third / 3.0 * np.sin(angles[1])
-    dx = 3.0 * (first * np.cos(angles[0]) + third * np.cos(angles[1]))
-    ddx = -9.0 * (first * np.sin(angles[0]) + 3.0 * third * np.sin(angles[1]))
-    motion = Motion(HOME.position + x[:, :3], HOME.rotation, dx[:, :3], np.zeros(3), ddx[:, :3],
-                    np.zeros(3))
-    platform = StewartPlatform(RIG)
-    capability = Capability(platform)
-
-    def found(of: Motion, times: Array | None) -> Any:
-        if ask == 'speed':
-            return capability.speed_factor(of, times=times)
-        if ask == 'amplitude':
-            return capability.amplitude_factor(of, HOME, times=times)
-        return capability.payload(of, [0.1, 0.2, 0.3], times=times)
-
-    between, samples = found(motion, times), found(motion, None)
-    assert 0.0 < between.value <= samples.value
-    assert times[between.sample] <= between.time <= times[between.sample] + 0.25
-    whole = Interpolation(np.diff(times), motion.rows)
-    where = np.append(np.arange(0.0, 8.0, 1.0 / 512.0), 8.0)
-    which = np.minimum(where.astype(np.int64), 7)
-    dense = found(Motion.of_rows(whole.at(which, where - which)), None)
-    assert between.value == pytest.approx(dense.value, rel=2e-4)
-    if ask == 'payload':
-        return
-    for factor in (1.0 - 2e-3, 1.0 + 2e-3):
-        k = factor * between.value
-        rows, at = motion.rows, times
-        if ask == 'speed':
-            rows, at = faster(rows, k), times / k
-        else:
-            rows = Deviations(Motion.from_pose(HOME), rows).at(k)
-        accepted = check_planned_trajectory(platform, at, Motion.of_rows(rows)).accepted
-        assert accepted == (factor < 1.0)
 
 
 def test_a_response_motion_is_as_large_as_the_limits_of_cranks_permit() -> None:

@@ -134,6 +134,14 @@ def test_signals_are_handled_before_anything_large_is_imported(module: str) -> N
         done.out.split())
 
 
+@pytest.mark.parametrize('module', ['datasheet', 'description', 'questions'])
+def test_help_needs_no_numpy(module: str) -> None:
+    code = (f'import sys; from stewart_dynamics.{module} import main\n'
+            'try: main(["--help"])\n'
+            'except SystemExit: print("numpy" in sys.modules)')
+    assert run_program(sys.executable, '-c', code).out.endswith('False\n')
+
+
 @pytest.mark.parametrize('kind', [number, frequency, between(-1.0, 1.0), share(0.5), whole(1, 9)])
 @pytest.mark.parametrize('text', ['nan', 'inf', '1e400', '', 'abc', '1_0', '\u0661'])
 def test_what_is_no_number_says_so_for_every_option(

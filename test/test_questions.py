@@ -16,7 +16,6 @@ from xml.etree import ElementTree
 
 import jsonschema
 import numpy as np
-from programs import run_program
 import pytest
 from referees import ROOT
 from snapshot import Snapshot
@@ -203,14 +202,6 @@ def test_a_file_of_another_kind_is_rejected(tmp_path: Path) -> None:
     done = answer(tmp_path, arguments=('rig.svg',))
     assert done.returncode == 2
     assert "'rig.svg': must end with .yaml" in done.stderr
-
-
-def test_help_needs_no_numpy() -> None:
-    code = ('import sys; from stewart_dynamics.questions import main\n'
-            'try: main(["--help"])\n'
-            'except SystemExit: print("numpy" in sys.modules)')
-    done = run_program('python3', '-c', code, code=None)
-    assert done.out.endswith('False\n')
 
 
 def test_an_answer_without_numbers_is_asked_again(tmp_path: Path) -> None:

@@ -203,15 +203,18 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return compiled(tmp_path_factory.mktemp('hexapod'), 'hexapod_steps.cpp')
 
 
-def assert_steps(program: Path, p: Parameters, random: np.random.Generator, count: int) -> Any:
-    """Compare all numbers of steps in random motions with the node's; return the records."""
-    motions = random_motion(p, random, count).rows
-    wrenches = random_wrench(p, random, count)
-    stamps = np.cumsum(random.choice([10_000_000, 300_000_000], count))
+COUNT = 20  # steps
+
+
+def assert_steps(program: Path, p: Parameters, motions: Array, wrenches: Array, stamps: Any = None,
+                 ) -> Any:
+    """Compare all numbers of steps with the node's; return the records."""
+    if stamps is None:
+        stamps = np.cumsum(np.full(len(motions), 300_000_000))
     rows = [f'{stamp}\n' + '\n'.join(map(float.hex, (*motion, *wrench)))
             for stamp, motion, wrench in zip(
                 stamps.tolist(), motions.tolist(), wrenches.tolist(), strict=True)]
-    text = '\n'.join([as_text(p) + str(count), *rows])
+    text = '\n'.join([as_text(p) + str(len(rows)), *rows])
     done = subprocess.run([program], input=text.encode(), capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b'')
     found = np.frombuffer(done.stdout, record('stewart_output'))
@@ -226,13 +229,20 @@ def assert_steps(program: Path, p: Parameters, random: np.random.Generator, coun
     return found
 
 
+def assert_random_steps(program: Path, p: Parameters, random: np.random.Generator) -> Any:
+    """Compare steps in random motions."""
+    return assert_steps(
+        program, p, random_motion(p, random, COUNT).rows, random_wrench(p, random, COUNT),
+        np.cumsum(random.choice([10_000_000, 300_000_000], COUNT)))
+
+
 def test_steps_have_the_bits_of_the_node(program: Path) -> None:
     """Forces, torques of motors, heat, limits: all numbers of each step, whatever is given."""
     random = rng(55)
     seen: set[int | str] = set()
     for _ in range(40):
         # The controller has all numbers of a setpoint in one cycle: no tolerance of stamps.
-        p, count = limited(random).replaced({'setpoint.sync_tolerance': 0.0}), 20
+        p = limited(random).replaced({'setpoint.sync_tolerance': 0.0})
         if random.random() < 0.5:
             p = p.replaced({'payload.mass': 40.0, 'payload.center_of_mass': [0.1, -0.1, 0.3],
                             'payload.inertia': [2.0, 0.1, 0.2, 3.0, -0.1, 4.0]})
@@ -241,7 +251,7 @@ def test_steps_have_the_bits_of_the_node(program: Path) -> None:
             p = p.replaced(dict(zip(
                 ('drive.base_universal_axes', 'drive.platform_universal_axes'),
                 axes.reshape(2, 18), strict=True)))
-        found = assert_steps(program, p, random, count)
+        found = assert_random_steps(program, p, random)
         seen |= {bits for bits in OF_ALL if (found['exceeded'] & bits).any()}
         if np.isfinite(found['motors']['commands']).all():
             seen.add('motors')
@@ -252,11 +262,11 @@ def test_circles_and_axes_of_the_home_pose_have_the_bits_of_the_node(program: Pa
     """Joints on circles, and joint axes along the legs at home, on both sides of the base."""
     random, exceeded, sides = rng(56), 0, set()
     for n in range(30):
-        p, count = limited_hexapod(random, 'all')[0], 20
+        p = limited_hexapod(random, 'all')[0]
         side = str(random.choice(['auto', 'positive', 'negative']))
         p = p.replaced({'geometry.platform_side': side, **(  # n odd: points in no plane
             {} if n % 2 else {**CIRCLES, 'geometry.base_height': random.normal()})})
-        found = assert_steps(program, p, random, count)
+        found = assert_random_steps(program, p, random)
         exceeded |= int(np.bitwise_or.reduce(found['exceeded'], axis=None))
         sides.add(side)
         assert np.isfinite(found['base_joint_angles']).all()
@@ -265,31 +275,13 @@ def test_circles_and_axes_of_the_home_pose_have_the_bits_of_the_node(program: Pa
         assert exceeded & LIMITS[name].bit
 
 
-def assert_crank_steps(program: Path, p: Parameters, motions: Array, wrenches: Array) -> Any:
-    """Compare all numbers of steps with the node's; return the records."""
-    stamps = np.cumsum(np.full(len(motions), 300_000_000))
-    rows = [f'{stamp}\n' + '\n'.join(map(float.hex, (*motion, *wrench)))
-            for stamp, motion, wrench in zip(
-                stamps.tolist(), motions.tolist(), wrenches.tolist(), strict=True)]
-    done = subprocess.run(
-        [program], input='\n'.join([as_text(p) + str(len(rows)), *rows]).encode(),
-        capture_output=True, check=False)
-    assert (done.returncode, done.stderr) == (0, b'')
-    found = np.frombuffer(done.stdout, record('stewart_output'))
-    outputs = Step(p)(Batch.of(stamps, motions, wrenches))
-    expected = outputs.records.copy()
-    for name in OUTPUT_FIELDS:
-        assert found[name].tobytes() == expected[name].tobytes(), name
-    return found
-
-
 def test_steps_of_cranks_have_the_bits_of_the_node(program: Path) -> None:
     """Angles, speeds, torques, levers, limits, motors; full tensors, tilted axes, branches."""
     seen: set[int | str] = set()
     of_cranks = {limit.bit for limit in LIMITS.values() if limit.name.startswith(CRANK.own)}
     for seed in range(30):
         random = rng(seed)
-        machine, count = random_machine(random), 20
+        machine = random_machine(random)
         drives = {'drive.gear_ratio': random.uniform(5.0, 50.0, 6), 'drive.efficiency': 0.8,
                   'actuator.reflected_inertia': None, 'drive.motor_inertia': 1e-4,
                   'drive.torque_max': random.uniform(0.01, 100.0, 6)} if seed % 2 else {}
@@ -301,8 +293,8 @@ def test_steps_of_cranks_have_the_bits_of_the_node(program: Path) -> None:
             'limits.angle_min': machine.middle - random.uniform(0.2, 3.0, 6),
             'limits.angle_max': machine.middle + random.uniform(0.2, 3.0, 6)})
         p = p.replaced(drives)
-        states = [random_state(machine, random, False) for _ in range(count)]
-        found = assert_crank_steps(
+        states = [random_state(machine, random, False) for _ in range(COUNT)]
+        found = assert_steps(
             program, p, np.stack([motion_of(state).rows for state in states]),
             np.stack([state.wrench for state in states]))
         seen |= {bits for bits in of_cranks if (found['exceeded'] & bits).any()}
@@ -326,12 +318,13 @@ def test_headings_and_branches_of_home_have_the_bits_of_the_node(program: Path) 
         motions[:, :3] = home.position + random.uniform(-0.02, 0.02, (5, 3))
         motions[:, 3:12] = home.rotation.ravel()
         motions[:, 12:] = random.normal(0.0, 0.5, (5, 12))
-        found = assert_crank_steps(program, p, motions, random.normal(0.0, 100.0, (5, 6)))
+        found = assert_steps(program, p, motions, random.normal(0.0, 100.0, (5, 6)))
         branches.add(tuple(np.sign(found['result']['levers'][0])))
     assert len(branches) > 1
 
 
-@pytest.mark.parametrize(('changes', 'message'), [
+# Changes of the parameters of a file that break a rule, and its words.
+RULES: dict[str, list[tuple[dict[str, Any], str]]] = {'crank_platform': [
     ({'legs.rod.length': []}, 'legs.rod.length: not set: needed by legs.crank.length'),
     ({'geometry.crank_angles': []}, 'geometry.crank_angles: not set: needed by '
      'legs.crank.length; or give geometry.crank_axes and geometry.crank_directions'),
@@ -350,15 +343,7 @@ def test_headings_and_branches_of_home_have_the_bits_of_the_node(program: Path) 
     ({'geometry.crank_angles': [], 'geometry.crank_axes': [1.0, 0.0, 0.0] * 6,
       'geometry.crank_directions': [1.0, 1.0, 0.0] * 6, 'geometry.crank_branch': ['positive']},
      'geometry.crank_directions: must be perpendicular to geometry.crank_axes, to 0.001 rad: leg '
-     'or plate 1')])
-def test_rules_of_cranks_in_one_line(
-        program: Path, changes: dict[str, Any], message: str) -> None:
-    p = Parameters.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
-    done = run_program(program, code=1, text=as_text(p, changes) + '0')
-    assert (done.out, done.err) == ('', f'{message}\n')
-
-
-@pytest.mark.parametrize(('changes', 'message'), [
+     'or plate 1')], 'platform': [
     ({'limits.length_min': [1.0, 2.0]}, 'limits.length_min: must have 1 or 6 entries, has 2'),
     ({'legs.piston.mass': [math.inf]}, 'legs.piston.mass: must be finite'),
     ({'drive.efficiency': [1.0, 1.0, 1.5, 1.0, 1.0, 1.0], 'actuator.screw_lead': [0.01]},
@@ -401,12 +386,18 @@ def test_rules_of_cranks_in_one_line(
     ({'limits.angle_max': [0.5]},
      'limits.angle_max: needs legs.crank.length, which is not set'),
     ({'payload.mass': 3.0, 'payload.inertia': [-1.0, 0.0, 0.0, 1.0, 0.0, 1.0]},
-     'payload: must be finite, its inertia positive semidefinite')])
-def test_rules_in_one_line(program: Path, changes: dict[str, Any], message: str) -> None:
+     'payload: must be finite, its inertia positive semidefinite')]}
+
+
+@pytest.mark.parametrize(('file', 'changes', 'message'), [
+    (file, *rule) for file, rules in RULES.items() for rule in rules])
+def test_rules_in_one_line(
+        program: Path, file: str, changes: dict[str, Any], message: str) -> None:
     """A rule that is broken is named with its parameter, and the leg; nothing is computed."""
-    p = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+    p = Parameters.from_yaml(ROOT / 'config' / f'{file}.yaml')
     bare: dict[str, Any] = {'drive.torque_max': [], 'actuator.screw_lead': []}
-    done = run_program(program, code=1, text=as_text(p, bare | changes) + '0')
+    done = run_program(
+        program, code=1, text=as_text(p, (bare if file == 'platform' else {}) | changes) + '0')
     assert (done.out, done.err) == ('', f'{message}\n')
 
 
