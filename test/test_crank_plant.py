@@ -10,6 +10,7 @@ from dataclasses import replace
 import math
 from typing import Any
 
+from cases import few
 from crank_machines import random_machine
 from crank_newton_euler import (
     BaseState, CrankHexapod, forward_dynamics, machine_of, masses, Motion, State)
@@ -170,7 +171,7 @@ def moving_base(time: float) -> BaseState:
 
 
 @pytest.mark.parametrize('base', [None, moving_base], ids=['fixed base', 'moving base'])
-@pytest.mark.parametrize('rubs', [False, True], ids=['free', 'friction'])
+@pytest.mark.parametrize('rubs', few([False, True], 1), ids=['free', 'friction'])
 def test_it_falls_from_home_as_free_bodies_do(
         base: Callable[[float], BaseState] | None, rubs: bool) -> None:
     """
@@ -241,7 +242,7 @@ def test_a_stop_before_the_dead_centre_holds_a_platform_without_limits_of_angles
     assert np.abs(ratios(plant) - LEVER_MIN).max() < 0.002
 
 
-@pytest.mark.parametrize('changes', [{}, MASSLESS], ids=['rig', 'massless'])
+@pytest.mark.parametrize('changes', few([{}, MASSLESS], 1), ids=['rig', 'massless'])
 @pytest.mark.parametrize('sign', [-1.0, 1.0], ids=['down', 'up'])
 def test_motors_at_their_limit_do_not_push_it_through(
         sign: float, changes: dict[str, Any]) -> None:
