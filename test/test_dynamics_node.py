@@ -31,6 +31,7 @@ from running import (
 from std_msgs.msg import Bool
 
 from stewart_dynamics import Pose, StewartPlatform
+from stewart_dynamics.executables import executable
 from stewart_dynamics.replay import main as replay
 
 Start = Fresh = Callable[..., DynamicsNode]
@@ -687,5 +688,5 @@ def test_for_any_input_only_finite_numbers_are_published_and_a_setpoint_is_answe
 
 
 def test_a_stray_argument_is_rejected() -> None:
-    ended = run_program('stewart_dynamics', 'foo', code=1)
+    ended = run_program(executable('stewart_dynamics'), 'foo', code=1)
     assert ended.err == 'stewart_dynamics: foo: unknown argument; see --help\n'

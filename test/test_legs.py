@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 import re
 import shutil
-import subprocess
 import sys
 
+from programs import run_program
 import pytest
 from referees import ROOT
 from stewart_dynamics import Capability, ParameterError, Parameters, StewartPlatform
@@ -30,19 +30,12 @@ PROGRAMS = {
     'stewart_export --fmu --linuxcnc': LINUXCNC, 'stewart_export --linuxcnc': LINUXCNC}
 
 
-def run(folder: Path, program: str, *arguments: str | Path) -> tuple[int, str, str]:
-    """Return the exit code of an installed program, its output and its errors."""
-    done = subprocess.run([Path(sys.executable).with_name(program), *arguments], cwd=folder,
-                          capture_output=True, text=True, timeout=300, check=False)
-    return done.returncode, done.stdout, done.stderr
-
-
 @pytest.mark.parametrize('command', PROGRAMS)
 def test_a_program_that_does_not_know_a_kind_says_so_first(tmp_path: Path, command: str) -> None:
     program, *arguments = command.split()
-    code, out, err = run(tmp_path, program, *arguments, '--params', CRANK_FILE, '--output',
-                         tmp_path / 'results')
-    assert (code, out) == (BAD_INPUT, '')
+    _, out, err = run_program(program, *arguments, '--params', CRANK_FILE, '--output',
+                              tmp_path / 'results', code=BAD_INPUT, folder=tmp_path)
+    assert out == ''
     assert err == f'{program}: {CRANK_FILE}: {NOT_FOR_CRANKS.format(PROGRAMS[command])}\n'
     assert not list(tmp_path.iterdir())
 
@@ -334,11 +327,8 @@ def with_pantographs(folder: Path) -> list[str]:
 def test_a_kind_is_a_file_of_c_a_module_and_its_parameters(tmp_path: Path) -> None:
     """A third kind of legs: the library and the step compute with it, and no other file has it."""
     needed = with_pantographs(tmp_path)
-    subprocess.run([sys.executable, 'setup.py', '--quiet', 'build_ext', '--inplace'],
-                   cwd=tmp_path, check=True, capture_output=True)
-    done = subprocess.run([sys.executable, '-c', PROGRAM, tmp_path / 'rig.yaml'], cwd=tmp_path,
-                          capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    run_program(sys.executable, 'setup.py', '--quiet', 'build_ext', '--inplace', folder=tmp_path)
+    run_program(sys.executable, '-c', PROGRAM, tmp_path / 'rig.yaml', folder=tmp_path)
     changed = [path.relative_to(tmp_path / 'stewart_dynamics').as_posix()
                for path in (tmp_path / 'stewart_dynamics').rglob('*.[hcp]*')
                if path.suffix in ('.c', '.h', '.py') and (
