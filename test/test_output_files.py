@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 
-"""The files of a replay with an entry for each setpoint, written in place and by a process."""
+"""The files of a replay with an entry for each setpoint, written in place and by processes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from snapshot import Snapshot
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
+from stewart_dynamics.replay.output_files import OutputFiles
 from stewart_dynamics.replay.replay_options import Options
 from test_legs_table import motions_of
 from test_output_bag import answered, PARAMETERS, times_of, turning
@@ -22,56 +22,60 @@ PROGRAM = 'stewart_replay'
 BLOCK = 100
 
 
-def started(kind: type[OutputFiles] | type[OutputProcess], folder: Path,
-            parameters: Parameters = PARAMETERS) -> OutputFiles | OutputProcess:
+def started(folder: Path, parameters: Parameters = PARAMETERS,
+            processes: bool = True) -> OutputFiles:
     folder.mkdir(exist_ok=True)
-    return kind(folder, parameters, Options(), False, [])
+    return OutputFiles(folder, parameters, Options(), False, [], processes)
 
 
-def write_block(files: OutputFiles | OutputProcess, first: int = 0) -> None:
+def write_block(files: OutputFiles, first: int = 0) -> None:
     outputs = turning(BLOCK, first)
     files.write(answered(outputs, times_of(BLOCK, first), motions_of(BLOCK)))
 
 
-def test_the_process_writes_the_same_files(tmp_path: Path) -> None:
-    for kind in (OutputFiles, OutputProcess):
-        files = started(kind, tmp_path / kind.__name__)
+def test_the_processes_write_the_same_files(tmp_path: Path) -> None:
+    for processes in (False, True):
+        files = started(tmp_path / f'{processes}', processes=processes)
         for first in range(0, 6 * BLOCK, BLOCK):
             write_block(files, first)
         files.close()
         files.abandon()  # closed before: nothing is left to do
     for name in ('legs.csv', 'bag/bag.mcap', 'bag/metadata.yaml'):
-        content = tmp_path.joinpath('OutputFiles', name).read_bytes()
-        assert tmp_path.joinpath('OutputProcess', name).read_bytes() == content
-    rows = (tmp_path / 'OutputFiles' / 'legs.csv').read_bytes()
+        content = tmp_path.joinpath('False', name).read_bytes()
+        assert tmp_path.joinpath('True', name).read_bytes() == content
+    rows = (tmp_path / 'False' / 'legs.csv').read_bytes()
     assert rows.count(b'\n') == 6 * BLOCK + 1
     assert b',,' in rows  # forces or base wrenches that are not known
 
 
 def test_errors_of_the_process_are_raised_here(tmp_path: Path, snapshot: Snapshot) -> None:
     (tmp_path / 'legs.csv').symlink_to('/dev/full')
-    files = started(OutputProcess, tmp_path)
+    files = started(tmp_path)
     with pytest.raises(OSError, match='No space left on device'):
         while True:
             write_block(files)
     files.abandon()
     joints = (PARAMETERS['base_frame'], *PARAMETERS['joints'][1:])
-    files = started(OutputProcess, tmp_path / 'names', PARAMETERS.replaced({'joints': joints}))
+    files = started(tmp_path / 'names', PARAMETERS.replaced({'joints': joints}))
     with snapshot.raises(ParameterError):
         files.close()
 
 
-def test_a_process_that_is_killed_is_reported(tmp_path: Path, snapshot: Snapshot) -> None:
-    files = started(OutputProcess, tmp_path)
-    assert isinstance(files, OutputProcess)
-    write_block(files)
-    files._process.kill()
-    with snapshot.raises(StewartError):
-        files.close()
+def test_a_process_that_is_killed_is_reported(
+        tmp_path_factory: pytest.TempPathFactory, snapshot: Snapshot) -> None:
+    for name in ('bag', 'table'):
+        folder = tmp_path_factory.mktemp(name)
+        files = started(folder)
+        write_block(files)
+        getattr(files, f'_{name}')._process.kill()
+        with snapshot.raises(StewartError) as caught:
+            files.close()
+        assert f'{caught.value}'.startswith(f'{folder}: ')
+        files.abandon()
 
 
 def test_an_abandoned_process_completes_nothing(tmp_path: Path) -> None:
-    files = started(OutputProcess, tmp_path)
+    files = started(tmp_path)
     write_block(files)
     files.abandon()
     assert not (tmp_path / 'bag' / 'metadata.yaml').exists()

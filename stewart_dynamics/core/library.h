@@ -392,6 +392,14 @@ void scan_records(
   int64_t size, const uint8_t * data, const int64_t * numbers, int64_t room, int64_t * found,
   int64_t * totals);
 
+/* Records of messages of a channel, at places (count,) of the content of a chunk, and their entries
+   (count, 2) of its index: recorded and published at times (count,) [ns], each message of a size
+   (count,) from its start (count,) in the data. */
+void write_records(
+  int64_t count, int64_t channel, const int64_t * times, const int64_t * starts,
+  const int64_t * sizes, const uint8_t * data, const int64_t * places, uint8_t * content,
+  int64_t * entries);
+
 /* Many hexapods: hexapod h has platforms[which[h]]. The strides of an array follow it, in numbers:
    from hexapod to hexapod, from sample to sample, and between the numbers of a sample; 0: one for
    all. A base of nan is still. Each is a kernel where NVRTC compiles hexapods.c. */

@@ -1,11 +1,12 @@
 /* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * Records of MCAP files: bags/mcap_file.py.
+ * Records of MCAP files: bags/mcap_file.py reads, replay/output_bag.py writes them.
  */
 
 enum {
-  RECORD_HEAD = 9, SCHEMA = 3, CHANNEL = 4, MESSAGE = 5, MESSAGE_INDEX = 7, LAST_OPCODE = 12
+  RECORD_HEAD = 9, MESSAGE_HEAD = 31, SCHEMA = 3, CHANNEL = 4, MESSAGE = 5, MESSAGE_INDEX = 7,
+  LAST_OPCODE = 12
 };
 
 /* Return the little-endian integer at a place; 0 if it is not in the data. */
@@ -46,4 +47,22 @@ void scan_records(
     at = begin + length;
   }
   totals[0] = count, totals[1] = at;
+}
+
+void write_records(
+  int64_t count, int64_t channel, const int64_t * times, const int64_t * starts,
+  const int64_t * sizes, const uint8_t * data, const int64_t * places, uint8_t * content,
+  int64_t * entries) {
+  for (int64_t k = 0; k < count; k++) {
+    uint8_t * record = content + places[k];
+    int64_t length = MESSAGE_HEAD - RECORD_HEAD + sizes[k];
+    record[0] = MESSAGE;
+    memcpy(record + 1, &length, 8);
+    memcpy(record + 9, &channel, 2);
+    memset(record + 11, 0, 4);  /* sequence */
+    memcpy(record + 15, &times[k], 8);
+    memcpy(record + 23, &times[k], 8);
+    memcpy(record + MESSAGE_HEAD, data + starts[k], (size_t)sizes[k]);
+    entries[2 * k] = times[k], entries[2 * k + 1] = places[k];
+  }
 }

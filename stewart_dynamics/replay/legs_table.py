@@ -97,6 +97,10 @@ class Table(ABC):
     def close(self) -> None:
         """Complete the file."""
 
+    def abandon(self) -> None:
+        """Close the file without completing it."""
+        self.close()
+
 
 class CsvTable(Table):
     """legs.csv: each number with the fewest digits that represent it exactly."""

@@ -41,7 +41,7 @@ from stewart_dynamics.replay.bag_summary import (
     BagSummary, Inputs, Mistake, Rejected, Setpoints as SetpointsOfBag, VERSION)
 from stewart_dynamics.replay.bag_topics import find_topics, notices_of
 from stewart_dynamics.replay.differentiate import differentiator
-from stewart_dynamics.replay.output_files import OutputFiles, OutputProcess
+from stewart_dynamics.replay.output_files import OutputFiles
 from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison, Efforts
 from stewart_dynamics.replay.summary import Answered, powers_of, Summary
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 
-# Starting a process takes as long as writing the outputs of a bag of this size [bytes].
+# Starting processes takes as long as writing the outputs of a bag of this size [bytes].
 _LARGE = 32 << 20
 
 
@@ -203,9 +203,10 @@ class _Run:
             self.report = Report(parameters, options.measured is not None, folder,
                                  options.uncertainty > 0)
             self._breakdown = ForceBreakdownRows(parameters)
-        files = OutputProcess if bytes_of(recording.path) > _LARGE else OutputFiles
-        self._files = files(folder, parameters, options, self._quasi_static,
-                            [topic for topic in topics if topic not in (MEASURED, MEASURED_POSE)])
+        self._files = OutputFiles(
+            folder, parameters, options, self._quasi_static,
+            [topic for topic in topics if topic not in (MEASURED, MEASURED_POSE)],
+            bytes_of(recording.path) > _LARGE)
         stack.callback(self._files.abandon)
 
     def subscriptions(self) -> list[Subscription]:

@@ -20,7 +20,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from struct import Struct
-from typing import Any
+from typing import Any, NamedTuple
 import zlib
 
 from mcap.data_stream import RecordBuilder
@@ -30,8 +30,9 @@ from mcap.records import (
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import get_typestore, Stores
-from stewart_dynamics.arrays import Array, Bytes, SECOND, Stamps
+from stewart_dynamics.arrays import Array, Bytes, Integers, SECOND, Stamps
 from stewart_dynamics.bags.mcap_file import HEAD, MAGIC
+from stewart_dynamics.core.binding import function
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.model import JOINT_STATES, LinkTransforms, MODEL_TYPES, TF
 from stewart_dynamics.description.urdf import urdf
@@ -39,7 +40,6 @@ from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import joint_state_layout
-from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.standard import string, transforms
 from stewart_dynamics.parameters.table import Parameters
@@ -56,13 +56,31 @@ RECORDED_TYPES = MODEL_TYPES | {
     TF_STATIC: type_names.TF_MESSAGE, ROBOT_DESCRIPTION: type_names.STRING}
 
 _LIBRARY = 'stewart_dynamics'
-_Group = tuple[str, Stamps, NDArray[np.void]]  # a topic, and messages at indices (K,) of times
 # Late subscribers get their last message, in `ros2 bag play`, too.
 _LATCHED = WARNING, TF_STATIC, ROBOT_DESCRIPTION
 # Bytes of a message record before the message: opcode, length, channel, sequence, two times.
 _HEAD = 31
 # Opcode, length, times of first and last message, size, checksum, no compression, size.
 _CHUNK_HEAD = Struct('<BQQQQIIQ')
+
+
+class _Group(NamedTuple):
+    """Messages of a topic in a chunk."""
+
+    topic: str
+    which: Integers  # (K,): indices of their times in those of the chunk
+    data: Bytes  # contains them
+    starts: Integers  # (K,): start of each in the data
+    sizes: Integers  # (K,): length of each [bytes]
+
+    @classmethod
+    def from_entries(cls, topic: str, which: Integers, messages: NDArray[np.void],
+                     rows: Integers) -> _Group:
+        """Return messages in rows (K,) of an array of messages of one size, without a copy."""
+        step, size = messages.strides[0], messages.itemsize
+        data = np.lib.stride_tricks.as_strided(
+            messages[:1].view(np.uint8), (step * (len(messages) - 1) + size,), (1,))
+        return cls(topic, which, data, step * rows, np.full(len(rows), size))
 
 
 class RecordedModel:
@@ -152,57 +170,47 @@ class OutputBag:
         for topic, having, messages in (
                 *self._messages.write_outputs(outputs),
                 self._messages.write_base_wrenches(outputs.stamps, block.base_wrenches)):
-            which = np.flatnonzero(having)
-            groups.append((topic, which, messages[which]))
+            if len(which := np.flatnonzero(having)):
+                groups.append(_Group.from_entries(topic, which, messages, which))
         groups += self._of_model(times, block.setpoints.motions, outputs)
-        self._write_messages(times, [group for group in groups if len(group[1])])
+        self._write_messages(times, groups)
 
     def write_inputs(self, recorded: Messages) -> None:
         """Write a chunk: recorded messages of the inputs."""
         if not len(recorded.times):
             return
-        groups: list[_Group] = []
-        for topic, places in recorded.find_places().items():
-            sizes = recorded.sizes[places]
-            for size in np.unique(sizes).tolist():
-                which = places[sizes == size]
-                groups.append((topic, which,
-                               at_any_byte(recorded.data, size)[recorded.starts[which]]))
-        self._write_messages(recorded.times, groups)
+        self._write_messages(recorded.times, [
+            _Group(topic, which, recorded.data, recorded.starts[which], recorded.sizes[which])
+            for topic, which in recorded.find_places().items()])
 
     def _write_messages(self, times: Stamps, groups: Sequence[_Group]) -> None:
         """Write a chunk of messages: by time, and of one time in the order of the groups."""
         sizes = np.zeros((len(times), len(groups)), dtype=np.int64)
-        for n, (_, which, messages) in enumerate(groups):
-            sizes[which, n] = _HEAD + messages.dtype.itemsize
+        for n, group in enumerate(groups):
+            sizes[group.which, n] = _HEAD + group.sizes
         ends = np.cumsum(sizes.ravel()).reshape(sizes.shape)
+        places = ends - sizes
         content = np.empty(ends[-1, -1], dtype=np.uint8)
-        indexes: dict[int, list[tuple[Stamps, Stamps]]] = {}
-        for n, (topic, which, messages) in enumerate(groups):
-            channel = self._channels[topic].id
-            starts = ends[which, n] - sizes[which, n]
-            records = np.empty(len(which), dtype=[
-                ('opcode', 'u1'), ('length', '<u8'), ('channel', '<u2'), ('sequence', '<u4'),
-                ('logged', '<u8'), ('published', '<u8'), ('data', messages.dtype)])
-            records['opcode'] = int(Opcode.MESSAGE)
-            records['length'] = records.dtype.itemsize - HEAD
-            records['channel'] = channel
-            records['sequence'] = 0
-            records['logged'] = records['published'] = times[which]
-            records['data'] = messages
-            at_any_byte(content, records.itemsize)[starts] = records.view(f'V{records.itemsize}')
-            indexes.setdefault(channel, []).append((times[which], starts))
+        indexes: dict[int, list[Integers]] = {}
+        for n, (topic, which, *messages) in enumerate(groups):
+            channel, entries = self._channels[topic].id, np.empty((len(which), 2), np.int64)
+            data, starts, its_sizes = messages
+            function('write_records')(
+                len(which), channel, times[which], starts, its_sizes, data, places[which, n],
+                content, entries)
+            indexes.setdefault(channel, []).append(entries)
             self._counts[channel] += len(which)
         self._write_chunk(content, int(times.min()), int(times.max()), indexes)
 
     def _of_model(self, times: Stamps, motions: Array, outputs: Outputs) -> Iterator[_Group]:
         """Yield the messages that show the model, as often as they are due."""
         if self._period and self._due is None:
+            first = np.zeros(1, dtype=np.int64)
             for topic, messages in self._model.write_beginning(int(outputs.stamps[0])):
-                yield topic, np.zeros(1, dtype=np.int64), messages
+                yield _Group.from_entries(topic, first, messages, first)
         which = np.array([*self._when_due(times.tolist())], dtype=np.int64)
         for topic, messages in self._model.write_motions(outputs.stamps[which], motions[which]):
-            yield topic, which, messages
+            yield _Group.from_entries(topic, which, messages, np.arange(len(which)))
 
     def _when_due(self, times: Sequence[int]) -> Iterator[int]:
         n = 0
@@ -240,7 +248,7 @@ class OutputBag:
         return b''.join(map(_bytes, (*self._schemas, *self._channels.values())))
 
     def _write_chunk(self, content: Bytes, begin: int, end: int,
-                     indexes: dict[int, list[tuple[Stamps, Stamps]]]) -> None:
+                     indexes: dict[int, list[Integers]]) -> None:
         at = self._file.tell()
         # Like mcap's Chunk, without two copies of the content.
         self._file.write(_CHUNK_HEAD.pack(
@@ -251,9 +259,10 @@ class OutputBag:
         offsets = {}
         for channel, parts in indexes.items():
             offsets[channel] = self._file.tell()
-            times, starts = (np.concatenate(part) for part in zip(*parts, strict=True))
-            order = np.argsort(starts, kind='stable')  # fast: mostly sorted
-            entries = np.column_stack([times, starts])[order].astype('<u8').tobytes()
+            rows = np.concatenate(parts)
+            if len(parts) > 1:
+                rows = rows[np.argsort(rows[:, 1], kind='stable')]  # fast: mostly sorted
+            entries = rows.tobytes()
             head = channel.to_bytes(2, 'little') + len(entries).to_bytes(4, 'little')
             self._file.write(bytes([Opcode.MESSAGE_INDEX])
                              + (len(head) + len(entries)).to_bytes(8, 'little') + head + entries)

@@ -2,16 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The files of a replay with an entry for each setpoint, and a process that writes them.
+The files of a replay with an entry for each setpoint, and the processes that write them.
 
 Assembling messages and formatting numbers take as long as computing them, and both hold Python's
-global lock: large bags are therefore written by a process of its own. It reads blocks from its
-standard input, and ends without completing the files when the replay is killed.
+global lock: output bag and table of a large bag are therefore written by a process each. It reads
+blocks from its standard input, and ends without completing its file when the replay is killed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -26,7 +26,7 @@ from stewart_dynamics.mechanics.limits import OF_JOINTS
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import unexpected
-from stewart_dynamics.replay.legs_table import kind_of_table
+from stewart_dynamics.replay.legs_table import kind_of_table, Table
 from stewart_dynamics.replay.output_bag import OutputBag, RecordedModel
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.replay.summary import Answered
@@ -40,24 +40,39 @@ _PIPE = 1 << 20
 _model = lru_cache(maxsize=1)(RecordedModel)  # many bags have one hexapod
 
 
+def open_bag(folder: Path, parameters: Parameters, options: Options,
+             inputs: Sequence[str]) -> OutputBag:
+    """Return the output bag, with the recorded messages of these topics of inputs."""
+    return OutputBag(folder / OUTPUT_BAG, options.node, OutputMessages(parameters),
+                     _model(parameters, options.node.strip('/')), parameters.visualization_rate,
+                     inputs)
+
+
+def open_table(folder: Path, parameters: Parameters, options: Options,
+               quasi_static: bool) -> Table:
+    """Return the table; columns that depend on velocities are empty if these are not known."""
+    return kind_of_table(options.parquet)(
+        folder, parameters.leg_kind, parameters.joints, quasi_static,
+        any(parameters[name] is not None for name in OF_JOINTS),
+        parameters.limits.leg_clearance_min is not None,
+        parameters[parameters.leg_kind.joint_force_limit] is not None)
+
+
 class OutputFiles:
     """
     The output bag and the table of a replay.
 
     quasi_static: velocities are not known: columns that depend on them are empty.
     inputs: topics of which the output bag has the recorded messages.
+    processes: each is written by a process, whose errors are raised by a later call.
     """
 
     def __init__(self, folder: Path, parameters: Parameters, options: Options,
-                 quasi_static: bool, inputs: Sequence[str]) -> None:
-        model = _model(parameters, options.node.strip('/'))
-        self._table = kind_of_table(options.parquet)(
-            folder, parameters.leg_kind, parameters.joints, quasi_static,
-            any(parameters[name] is not None for name in OF_JOINTS),
-            parameters.limits.leg_clearance_min is not None,
-            parameters[parameters.leg_kind.joint_force_limit] is not None)
-        self._bag = OutputBag(folder / OUTPUT_BAG, options.node, OutputMessages(parameters), model,
-                              parameters.visualization_rate, inputs)
+                 quasi_static: bool, inputs: Sequence[str], processes: bool) -> None:
+        table = folder, parameters, options, quasi_static
+        bag = folder, parameters, options, inputs
+        self._table = FileProcess(open_table, *table) if processes else open_table(*table)
+        self._bag = FileProcess(open_bag, *bag) if processes else open_bag(*bag)
 
     def write(self, block: Answered) -> None:
         """Write setpoints."""
@@ -75,16 +90,19 @@ class OutputFiles:
 
     def abandon(self) -> None:
         """Close the files without completing them."""
-        self._table.close()
+        self._table.abandon()
         self._bag.abandon()
 
 
-class OutputProcess:
-    """Output files, by the same calls, that a process writes; its errors are raised here."""
+class FileProcess:
+    """
+    An output bag or a table, by the same calls, that a process writes.
 
-    def __init__(self, folder: Path, parameters: Parameters, options: Options,
-                 quasi_static: bool, inputs: Sequence[str]) -> None:
-        self._folder = folder
+    open_file: opens it in the process, with these arguments, of which the first is the folder.
+    """
+
+    def __init__(self, open_file: Callable[..., OutputBag | Table], *arguments: Any) -> None:
+        self._folder = arguments[0]
         # A session of its own: Ctrl-C ends the replay, which ends the process.
         self._process = subprocess.Popen(
             [sys.executable, '-I', '-c', _PROGRAM, *sys.path], stdin=subprocess.PIPE,
@@ -94,7 +112,7 @@ class OutputProcess:
         with suppress(ImportError, OSError):  # other systems; too many large pipes
             from fcntl import F_SETPIPE_SZ, fcntl
             fcntl(self._blocks, F_SETPIPE_SZ, _PIPE)
-        self._send((folder, parameters, options, quasi_static, inputs))
+        self._send((open_file, arguments))
 
     def write(self, block: Answered) -> None:
         """Send setpoints; raises the error of earlier ones."""
@@ -105,12 +123,12 @@ class OutputProcess:
         self._send(recorded.compact())
 
     def close(self) -> None:
-        """Complete the files."""
+        """Complete the file."""
         self._send(None)
         self._end()
 
     def abandon(self) -> None:
-        """End the process without completing the files."""
+        """End the process without completing the file."""
         self._process.kill()
         self._process.wait()
         for pipe in (self._blocks, self._error):
@@ -141,13 +159,14 @@ def main() -> None:
     """Write the blocks of the standard input; an error goes to the standard output."""
     blocks, error = sys.stdin.buffer, sys.stdout.buffer
     try:
-        files = OutputFiles(*pickle.load(blocks))
+        open_file, arguments = pickle.load(blocks)
+        file = open_file(*arguments)
         while (block := pickle.load(blocks)) is not None:
             if isinstance(block, Messages):
-                files.write_inputs(block)
+                file.write_inputs(block)
             else:
-                files.write(block)
-        files.close()
+                file.write(block)
+        file.close()
     except (EOFError, pickle.UnpicklingError):
         pass  # the replay was killed
     except (StewartError, OSError) as exc:
