@@ -22,12 +22,13 @@ from stewart_dynamics.legs import TELESCOPIC
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.singularity_warning import CAUSE
-from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
+from stewart_dynamics.replay.legs_table import column_names, CsvTable, LegsRows, ParquetTable
 from stewart_dynamics.setpoints.step import Computed, FIRST, OUTPUT, Outputs, WARNING_STATE
-from test_output_bag import answered, base_wrenches_of, LEGS, PARAMETERS, turning
+from test_output_bag import answered, base_wrenches_of, PARAMETERS, turning
 
 RESULTS = 27
 PUBLISHED = TELESCOPIC.published
+ROWS = LegsRows(PARAMETERS)
 
 
 def motions_of(number: int) -> NDArray[np.float64]:
@@ -61,11 +62,11 @@ def read_csv(file: Path) -> tuple[list[str], list[list[str]]]:
 def check_tables(folder: Path, blocks: list[Outputs]) -> None:
     """Check that both tables give every number back to the bit."""
     tables: list[Any] = [
-        kind(folder, TELESCOPIC, LEGS) for kind in (CsvTable, ParquetTable)]
+        kind(folder, ROWS.names) for kind in (CsvTable, ParquetTable)]
     for table in tables:
         for outputs in blocks:
             number = len(outputs.stamps)
-            table.write(answered(outputs, outputs.stamps, motions_of(number)))
+            table.write(ROWS.of_block(answered(outputs, outputs.stamps, motions_of(number))))
         table.close()
     head, rows = read_csv(folder / 'legs.csv')
     parquet = pyarrow.parquet.read_table(folder / 'legs.parquet')
@@ -136,9 +137,9 @@ def test_numbers_at_the_edges(tmp_path: Path) -> None:
 @pytest.mark.parametrize('table', [CsvTable, ParquetTable])
 def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> None:
     legs = ('größe', 'a "leg"', 'one, two', 'line\nbreak', ' ', "'=1+1'")
-    writer = table(tmp_path, TELESCOPIC, legs)
+    writer = table(tmp_path, column_names(TELESCOPIC, legs))
     outputs = turning(2)
-    writer.write(answered(outputs, outputs.stamps, motions_of(2)))
+    writer.write(ROWS.of_block(answered(outputs, outputs.stamps, motions_of(2))))
     writer.close()
     if table is CsvTable:
         head, rows = read_csv(tmp_path / 'legs.csv')
@@ -150,7 +151,7 @@ def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> No
 
 
 def test_the_base_wrench_is_before_the_warning(tmp_path: Path) -> None:
-    CsvTable(tmp_path, TELESCOPIC, LEGS).close()
+    CsvTable(tmp_path, ROWS.names).close()
     head, _ = read_csv(tmp_path / 'legs.csv')
     assert head[-8:] == [
         'condition', 'base_force_x_n', 'base_force_y_n', 'base_force_z_n', 'base_moment_x_n_m',
@@ -158,7 +159,8 @@ def test_the_base_wrench_is_before_the_warning(tmp_path: Path) -> None:
 
 
 def test_no_column_name_is_a_formula(tmp_path: Path) -> None:
-    CsvTable(tmp_path, TELESCOPIC, ('=1+1', '+a', '-b', '@c', '\td', 'e')).close()
+    legs = '=1+1', '+a', '-b', '@c', '\td', 'e'
+    CsvTable(tmp_path, column_names(TELESCOPIC, legs)).close()
     head, _ = read_csv(tmp_path / 'legs.csv')
     assert [name.removesuffix('_length_m') for name in head[9:15]] == [
         "'=1+1", "'+a", "'-b", "'@c", "'\td", 'e']
@@ -166,9 +168,9 @@ def test_no_column_name_is_a_formula(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('table', [CsvTable, ParquetTable])
 def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
-    writer = table(tmp_path, TELESCOPIC, LEGS)
+    writer = table(tmp_path, ROWS.names)
     outputs = turning(0)
-    writer.write(answered(outputs, outputs.stamps, motions_of(0)))
+    writer.write(ROWS.of_block(answered(outputs, outputs.stamps, motions_of(0))))
     writer.close()
     file, = tmp_path.iterdir()
     if table is CsvTable:
@@ -180,9 +182,9 @@ def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
 
 def test_parquet_is_written_in_groups_of_many_rows(tmp_path: Path) -> None:
     outputs = turning(1000)
-    table = ParquetTable(tmp_path, TELESCOPIC, LEGS)
+    table = ParquetTable(tmp_path, ROWS.names)
     for _ in range(100):
-        table.write(answered(outputs, outputs.stamps, motions_of(1000)))
+        table.write(ROWS.of_block(answered(outputs, outputs.stamps, motions_of(1000))))
     table.close()
     file = pyarrow.parquet.ParquetFile(tmp_path / 'legs.parquet')
     assert file.metadata.num_rows == 100_000

@@ -1,8 +1,18 @@
 /* SPDX-FileCopyrightText: 2026 The stewart_dynamics developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * Lengths, poses, twists; angles of the joints and clearance of the legs.
+ * Lengths, poses, twists; angles of the joints and clearance of the legs; Euler angles.
  */
+
+void euler_angles_many(int64_t count, const double * rotations, double * angles) {
+  for (int64_t n = 0; n < count; n++, rotations += 9, angles += 3) {
+    const double * r = rotations;
+    double gamma = atan2(r[3], r[0]), c = cos(gamma), s = sin(gamma);
+    angles[0] = atan2(s * r[2] - c * r[5], c * r[4] - s * r[1]);
+    angles[1] = atan2(-r[6], (double)hypotl(r[0], r[3]));  /* rounded once, on all systems */
+    angles[2] = gamma;
+  }
+}
 
 void positions_many(
   const stewart_platform * platform, int64_t count, const stewart_pose * poses,

@@ -373,6 +373,9 @@ void without_losses_many(
   const stewart_platform * platform, int64_t count, const double * forces, const double * rates,
   const double * accelerations, double * loads);
 
+/* Angles alpha, beta, gamma (count, 3) [rad] of rotations (count, 9), row by row. */
+void euler_angles_many(int64_t count, const double * rotations, double * angles);
+
 /* Motors of motions, for demanded and published efforts of the drives (count, 6). */
 void motors_many(
   const stewart_platform * platform, int64_t count, const stewart_motion * motions,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 import orjson
@@ -18,9 +18,13 @@ from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.legs.kind import LegKind
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.limits import OF_JOINTS
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.records import key_of
-from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.reporting.results_folder import LEGS_CSV, LEGS_PARQUET
+
+if TYPE_CHECKING:  # the process that writes the table does not need it
+    from stewart_dynamics.replay.summary import Answered
 
 # Beginnings of text that spreadsheet programs execute.
 _FORMULA = ('=', '+', '-', '@', '\t', '\r', '\n')
@@ -47,32 +51,32 @@ def column_names(kind: LegKind, legs: Sequence[str], joint_angles: bool = False,
             *(f'{leg}_{quantity}' for quantity in limited for leg in legs), 'warning']
 
 
-class Table(ABC):
-    """
-    A file with one row per setpoint.
+class Rows(NamedTuple):
+    """N rows of the table."""
 
-    folder: folder of the file.
-    kind, legs: kind of the legs, and their names.
+    stamps: Stamps  # (N,) [ns]
+    numbers: Array  # (N, 41 to 65), nan: not known
+    warnings: Flags  # (N,)
+
+
+class LegsRows:
+    """
+    Columns of the table of a hexapod, and its rows.
+
     quasi_static: velocities are not known: columns that depend on them are empty.
-    joint_angles, clearance, joint_forces: there are columns of the angles of the joints, of the
-        clearance between the legs, and of the forces in rods and joints.
     """
 
-    FILE = ''
+    def __init__(self, parameters: Parameters, quasi_static: bool = False) -> None:
+        kind = parameters.leg_kind
+        self._quasi_static = quasi_static
+        self._joint_forces = parameters[kind.joint_force_limit] is not None
+        self.names = column_names(
+            kind, parameters.joints, any(parameters[name] is not None for name in OF_JOINTS),
+            parameters.limits.leg_clearance_min is not None, self._joint_forces)
 
-    def __init__(
-            self, folder: Path, kind: LegKind, legs: Sequence[str], quasi_static: bool = False,
-            joint_angles: bool = False, clearance: bool = False, joint_forces: bool = False,
-            ) -> None:
-        self._quasi_static, self._joint_forces = quasi_static, joint_forces
-        self._open(folder / self.FILE, column_names(
-            kind, legs, joint_angles, clearance, joint_forces))
-
-    def write(self, block: Answered) -> None:
-        """Write the rows of N setpoints."""
+    def of_block(self, block: Answered) -> Rows:
+        """Return the rows of N setpoints."""
         outputs, motions = block.outputs, block.setpoints.motions
-        if not len(outputs.stamps):
-            return
         rates, determinant_rates = outputs.rates, outputs.determinant_rates
         if self._quasi_static:
             rates = np.full_like(rates, np.nan)
@@ -83,15 +87,26 @@ class Table(ABC):
             outputs.determinants, determinant_rates, outputs.conditions, block.base_wrenches,
             outputs.joint_forces[:, :6 if self._joint_forces else 0], outputs.joint_angles,
             outputs.clearances])
-        self._write(outputs.stamps, numbers, outputs.warnings)
+        return Rows(outputs.stamps, numbers, outputs.warnings)
+
+
+class Table(ABC):
+    """
+    A file with one row per setpoint.
+
+    folder: folder of the file.
+    names: names of the columns.
+    """
+
+    FILE = ''
 
     @abstractmethod
-    def _open(self, path: Path, names: Sequence[str]) -> None:
+    def __init__(self, folder: Path, names: Sequence[str]) -> None:
         """Begin the file."""
 
     @abstractmethod
-    def _write(self, stamps: Stamps, numbers: Array, warnings: Flags) -> None:
-        """Write rows: stamps (N,) [ns], numbers (N, 41 to 65) with nan: not known, warnings."""
+    def write(self, rows: Rows) -> None:
+        """Write rows."""
 
     @abstractmethod
     def close(self) -> None:
@@ -107,20 +122,23 @@ class CsvTable(Table):
 
     FILE = LEGS_CSV
 
-    def _open(self, path: Path, names: Sequence[str]) -> None:
-        self._file = path.open('wb')
+    def __init__(self, folder: Path, names: Sequence[str]) -> None:
+        self._file = (folder / self.FILE).open('wb')
         self._file.write(','.join(_quoted(harmless(name)) for name in names).encode() + b'\n')
 
-    def _write(self, stamps: Stamps, numbers: Array, warnings: Flags) -> None:
-        self._file.write(_rows(stamps, numbers, warnings))
+    def write(self, rows: Rows) -> None:
+        """Write rows."""
+        if len(rows.stamps):
+            self._file.write(_text_of(rows))
 
     def close(self) -> None:
         """Complete the file."""
         self._file.close()
 
 
-def _rows(stamps: Stamps, numbers: Array, warnings: Flags) -> bytes:
-    """Return the text of rows: stamps (N,) [ns], numbers (N, K) with nan as empty, warnings."""
+def _text_of(rows: Rows) -> bytes:
+    """Return the text of rows, nan as empty."""
+    stamps, numbers, warnings = rows
     text = orjson.dumps(numbers, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2]
     if not np.isfinite(numbers).all():
         text = text.replace(b'null', b'')
@@ -148,7 +166,7 @@ class ParquetTable(Table):
 
     FILE = LEGS_PARQUET
 
-    def _open(self, path: Path, names: Sequence[str]) -> None:
+    def __init__(self, folder: Path, names: Sequence[str]) -> None:
         try:
             import pyarrow
             import pyarrow.parquet
@@ -159,10 +177,12 @@ class ParquetTable(Table):
         self._schema = pyarrow.schema([
             (names[0], pyarrow.int64()), *((name, pyarrow.float64()) for name in names[1:-1]),
             (names[-1], pyarrow.bool_())])
-        self._writer = pyarrow.parquet.ParquetWriter(path, self._schema)
+        self._writer = pyarrow.parquet.ParquetWriter(folder / self.FILE, self._schema)
         self._waiting: list[Any] = []
 
-    def _write(self, stamps: Stamps, numbers: Array, warnings: Flags) -> None:
+    def write(self, rows: Rows) -> None:
+        """Write rows."""
+        stamps, numbers, warnings = rows
         self._waiting.append(self._arrow.record_batch(
             [self._arrow.array(column, type=field.type, from_pandas=True) for column, field in zip(
                 [stamps, *numbers.T, warnings], self._schema, strict=True)],

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.core.binding import function
 
 
 def from_euler(angles: ArrayLike) -> Array:
@@ -37,19 +38,11 @@ def to_euler(rotation: ArrayLike) -> Array:
     Where beta is 90 degrees only the sum or difference of the others is determined: alpha is
     computed with gamma as it is found, so that the rotation is exact everywhere.
     """
-    r = np.asarray(rotation, dtype=float)
-    # One by one: bits of numpy 1.26's arctan2 depend on where its arguments are in memory.
-    found = [euler_of(each) for each in r.reshape(-1, 9).tolist()]
-    return np.array(found).reshape(*r.shape[:-2], 3)
-
-
-def euler_of(rotation: Sequence[float]) -> tuple[float, float, float]:
-    """Return the same for the nine numbers of one matrix."""
-    r00, r01, r02, r10, r11, r12, r20, _, _ = rotation
-    gamma = math.atan2(r10, r00)
-    c, s = math.cos(gamma), math.sin(gamma)
-    return (math.atan2(s * r02 - c * r12, c * r11 - s * r01),
-            math.atan2(-r20, math.hypot(r00, r10)), gamma)
+    r = np.ascontiguousarray(rotation, dtype=float)
+    angles = np.empty((*r.shape[:-2], 3))
+    # In C: bits of numpy 1.26's arctan2 depend on where its arguments are in memory.
+    function('euler_angles_many')(angles.size // 3, r, angles)
+    return angles
 
 
 def euler_rate_matrix(angles: ArrayLike) -> Array:
