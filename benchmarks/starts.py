@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How long programs take to start.
+How long programs take to start, and the memory that they have then.
 
 Run by hand, ``make bench``, on Linux; see README.md beside this file.
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 import os
+from pathlib import Path
 import signal
 from statistics import median
 import subprocess
@@ -65,6 +66,8 @@ class Start(NamedTuple):
     """Until it was ready, or had ended."""
     processor: float
     """Of the program and of those that it started [s]."""
+    memory: float
+    """Resident when it was ready, or at most [MB]."""
 
 
 def until_ready(command: Sequence[str], environment: Mapping[str, str]) -> Start:
@@ -76,10 +79,12 @@ def until_ready(command: Sequence[str], environment: Mapping[str, str]) -> Start
                for line in program.stderr):
         raise SystemExit(f'{command[0]} has ended before it was ready')
     seconds = time.perf_counter() - begun
+    status = Path(f'/proc/{program.pid}/status').read_text(encoding='utf-8')
     program.send_signal(signal.SIGTERM)
     _, _, usage = os.wait4(program.pid, 0)
     program.returncode = 0
-    return Start(seconds, usage.ru_utime + usage.ru_stime)
+    return Start(seconds, usage.ru_utime + usage.ru_stime, _megabytes(
+        int(status.partition('VmRSS:')[2].split()[0])))
 
 
 def until_ended(command: Sequence[str], environment: Mapping[str, str]) -> Start:
@@ -91,7 +96,12 @@ def until_ended(command: Sequence[str], environment: Mapping[str, str]) -> Start
     program.returncode = os.waitstatus_to_exitcode(status)
     if program.returncode:
         raise SystemExit(f'{" ".join(command)[:200]}: exit code {program.returncode}')
-    return Start(time.perf_counter() - begun, usage.ru_utime + usage.ru_stime)
+    return Start(time.perf_counter() - begun, usage.ru_utime + usage.ru_stime,
+                 _megabytes(usage.ru_maxrss))
+
+
+def _megabytes(kibibytes: int) -> float:
+    return kibibytes * 1024 / 1e6
 
 
 Run = Callable[[Sequence[str], Mapping[str, str]], Start]
@@ -122,11 +132,14 @@ def run(rounds: int) -> tuple[list[str], list[Figure]]:
             if number >= 0:
                 found[name].append(start)
     of = {name: Start(*map(median, zip(*starts, strict=True))) for name, starts in found.items()}
-    cells = [('start', 's', 'processor s'), *(
-        (name, f'{each.seconds:.2f}', f'{each.processor:.2f}') for name, each in of.items())]
+    cells: list[tuple[str, ...]] = [('start', 's', 'processor s', 'memory (MB)'), *(
+        (name, f'{each.seconds:.2f}', f'{each.processor:.2f}', f'{each.memory:.1f}')
+        for name, each in of.items())]
     return ['', *markdown(cells), '', f'{processor_name()}. Medians of {rounds} starts.', ''], [
         Figure('start of the node', of[OF_NODE].seconds, 0.5, 's'),
         Figure('start of the node, times that of a bare one',
                of[OF_NODE].seconds / of[OF_BARE_NODE].seconds, 1.5, ''),
+        Figure('memory of the node, times that of a bare one',
+               of[OF_NODE].memory / of[OF_BARE_NODE].memory, 1.3, ''),
         Figure('`import stewart_dynamics`', of['`import stewart_dynamics`'].seconds, 0.06, 's'),
         Figure('`stewart_replay --help`', of['`stewart_replay --help`'].seconds, 0.2, 's')]

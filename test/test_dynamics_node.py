@@ -11,6 +11,7 @@ import json
 import math
 from pathlib import Path
 import signal
+import sys
 import time
 from typing import Any
 
@@ -42,6 +43,23 @@ FLAT = Sample((0.0, 0.0, 0.0))
 TURNED = Sample((0.0, 0.0, 0.9), (0.0, 0.0, math.sin(0.768), math.cos(0.768)))
 LATER = 10_000_000_000  # the legs can be anywhere then [ns]
 LEAPING = Sample(accel=(0.0, 0.0, 100.0, 0.0, 0.0, 0.0))
+
+
+# What a service, a subscriber or an error alone needs, and what other programs need.
+UNUSED = (
+    'argparse', 'difflib', 'jinja2', 'mcap', 'msgspec', 'orjson', 'plotly', 'rosbags', 'scipy',
+    'statistics', 'xml', 'stewart_dynamics.capability', 'stewart_dynamics.identification',
+    'stewart_dynamics.description.read_urdf', 'stewart_dynamics.replay',
+    'stewart_dynamics.reporting')
+
+
+def test_what_the_node_does_not_use_is_not_in_its_memory() -> None:
+    done = run_program(
+        sys.executable, '-c', 'import sys, rclpy.lifecycle; before = {*sys.modules}\n'
+        'import stewart_dynamics.node.dynamics_node; print(*{*sys.modules} - before)')
+    imported = done.out.split()
+    assert 'stewart_dynamics.setpoints.step' in imported
+    assert not {*UNUSED} & {*imported}
 
 
 # Setpoints from a bag

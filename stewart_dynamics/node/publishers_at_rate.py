@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import math
 import sys
 import time
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import numpy as np
@@ -19,7 +19,6 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.limits import limits_of
@@ -30,6 +29,9 @@ from stewart_dynamics.node.topics import DIAGNOSTICS, NodeTopics, TRAVEL_RATE
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import RepeatedLog
 from stewart_dynamics.setpoints.output_messages import LEG_STATES, LegTopics
+
+if TYPE_CHECKING:
+    from stewart_dynamics.capability.capability import Capability
 
 # Directions in the order of the message: each of x y z rx ry rz to minus, then to plus.
 _DIRECTIONS = np.stack([-np.eye(6), np.eye(6)], axis=1).reshape(12, 6)
@@ -93,8 +95,7 @@ class TravelPublisher(PublisherAtRate):
         """Use other parameters from now on."""
         self._parameters = parameters
         self._values: Future[Array] | None = None
-        self._capability = self._thread.submit(
-            lambda: Capability(StewartPlatform(parameters)))
+        self._capability: Future[Capability] | None = None
 
     def look(self) -> str:
         """Check whether there is a subscriber; return a notice where no limit is set, once."""
@@ -120,11 +121,20 @@ class TravelPublisher(PublisherAtRate):
         if self._values is None and self._unpublished is not None and now >= self._due:
             (motion,), self._unpublished = self._unpublished, None
             self._due = now + self._period
+            if self._capability is None:
+                self._capability = self._thread.submit(_capability_of, self._parameters)
             self._values = self._thread.submit(_travel, self._capability, motion)
 
     @staticmethod
     def _message(values: Array) -> Float64MultiArray:
         return Float64MultiArray(layout=_LAYOUT, data=values.tolist())
+
+
+def _capability_of(parameters: Parameters) -> Capability:
+    """Return the capability; its module is not in the memory of a node without subscribers."""
+    from stewart_dynamics.capability.capability import Capability
+
+    return Capability(StewartPlatform(parameters))
 
 
 def _travel(capability: Future[Capability], motion: Sequence[float]) -> Array:

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-import difflib
 from itertools import chain
 import math
 from operator import attrgetter
@@ -219,6 +218,8 @@ _MISSPELT, _SIMILAR = 0.9, 0.6
 
 def _similar(text: str, names: Collection[str]) -> list[str]:
     """Return names that an unknown name may stand for; those of its group where that exists."""
+    import difflib  # nothing else needs it
+
     group = text[:text.rfind('.') + 1]
     members = [each for each in names if each.startswith(group)]
     if not members:

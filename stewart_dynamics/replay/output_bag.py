@@ -34,7 +34,8 @@ from stewart_dynamics.arrays import Array, Bytes, Integers, SECOND, Stamps
 from stewart_dynamics.bags.mcap_file import HEAD, MAGIC
 from stewart_dynamics.core.binding import function
 from stewart_dynamics.description.hexapod import Hexapod
-from stewart_dynamics.description.model import JOINT_STATES, LinkTransforms, MODEL_TYPES, TF
+from stewart_dynamics.description.link_transforms import LinkTransforms
+from stewart_dynamics.description.model import JOINT_STATES, MODEL_TYPES, TF
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION

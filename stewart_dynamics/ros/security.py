@@ -17,7 +17,6 @@ import os
 from pathlib import Path
 import re
 import warnings
-from xml.etree import ElementTree
 
 from stewart_dynamics.errors import StewartError
 
@@ -131,6 +130,8 @@ def _check_profiles() -> None:
 
 
 def _check_profile(path: Path) -> None:
+    from xml.etree import ElementTree  # a node without a profile does not need it
+
     try:
         # Fast DDS takes an empty line before <?xml, and -- in a comment.
         text = _COMMENT.sub('', path.read_text(encoding='utf-8')).lstrip()

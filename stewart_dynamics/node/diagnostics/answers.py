@@ -15,7 +15,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
-from statistics import median
 
 from stewart_dynamics.arrays import Array, NANOSECOND, SECOND
 from stewart_dynamics.mechanics.drives.servos import outside_servos, with_servos
@@ -98,9 +97,11 @@ class TimingDiagnostics(StatusPart):
     def status(self, now: float) -> Status:
         """Return the status."""
         values = []
-        if times := self._answers.second_before.times + self._answers.second.times:
-            values = [('processing time, median (us)', f'{median(times) * 1e6:.0f}'),
-                      ('processing time, largest (us)', f'{max(times) * 1e6:.0f}')]
+        if times := sorted(self._answers.second_before.times + self._answers.second.times):
+            # ``statistics`` and ``numpy.median`` would load a megabyte of code.
+            median = 0.5 * (times[(len(times) - 1) // 2] + times[len(times) // 2])
+            values = [('processing time, median (us)', f'{median * 1e6:.0f}'),
+                      ('processing time, largest (us)', f'{times[-1] * 1e6:.0f}')]
         for key, reason in (('dropped', DROPPED), ('incomplete', NOT_JOINED)):
             values.append((key, str(sum(n for rejection, n in self._of_setpoints.items()
                                         if rejection.reason == reason))))
