@@ -83,7 +83,12 @@ class FilesOfFolder:
             self._before = {path.name: identity(path) for path in folder.iterdir()}
 
     def check(self, names: Iterable[str]) -> None:
-        """Raise StewartError where a file exists that may not be replaced."""
+        """
+        Raise StewartError where a file exists that may not be replaced, before any work is lost.
+
+        Raises OSError where the folder, or a file of another kind, does not let them be written.
+        """
+        _check_folder(self._folder)
         for path in (self._folder / name for name in names):
             found = identity(path)
             if found is None:
@@ -93,6 +98,8 @@ class FilesOfFolder:
             if found != self._before.get(path.name):
                 raise StewartError(f'{path}: another run has written it meanwhile: it is not '
                                    'replaced')
+            with named(path):
+                _mode_to_replace(path)
 
     def existing(self, names: Iterable[str], beside: Mapping[str, str]) -> list[str]:
         """Return the files that exist, of ``beside`` those with another content."""
@@ -255,12 +262,28 @@ def named(path: str | Path) -> Iterator[None]:
         raise type(exc)(exc.errno, exc.strerror, str(path)) from exc
 
 
-def _write(partial: Path, final: Path, content: str | bytes) -> None:
+def _check_folder(folder: Path) -> None:
+    """Raise OSError where no file can be written to a folder, or it cannot be made."""
+    while not os.path.lexists(folder):  # it will be made
+        folder = folder.parent
+    if not folder.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
+
+
+def _mode_to_replace(final: Path) -> int | None:
+    """Return the mode of a file or link, None if missing; OSError if it cannot be replaced."""
     mode = final.lstat().st_mode if identity(final) else None
     if mode is not None and stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     if mode is not None and not (stat.S_ISREG(mode) or stat.S_ISLNK(mode)):
         raise OSError(errno.EINVAL, 'not a regular file')
+    return mode
+
+
+def _write(partial: Path, final: Path, content: str | bytes) -> None:
+    mode = _mode_to_replace(final)
     with partial.open('xb') as file:
         if mode is not None and stat.S_ISREG(mode):
             os.fchmod(file.fileno(), stat.S_IMODE(mode))

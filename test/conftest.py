@@ -149,6 +149,12 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Schedul
                 self.workqueue.move_to_end(next(reversed(self.workqueue)), last=False)
             super()._assign_work_unit(node)
 
+        def _reschedule(self, node: WorkerController) -> None:
+            # A worker in place of one that crashed gets work when it has collected the tests;
+            # xdist gives it some at the next crash or collection of another, and ends by KeyError.
+            if node in self.registered_collections:
+                super()._reschedule(node)
+
     return Pools(config, log)
 
 

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-import errno
-import os
 from pathlib import Path
 
 from stewart_dynamics.errors import StewartError
@@ -50,19 +48,6 @@ def _file(text: str) -> Path:
     return Path(text)
 
 
-def _check_writable(folder: Path, names: Sequence[str]) -> None:
-    """Raise OSError where files cannot be written: a name is a folder, or the folder is a file."""
-    for path in (folder / name for name in names):
-        if path.is_dir():
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    while not folder.exists():  # it will be made
-        folder = folder.parent
-    if not folder.is_dir():
-        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
-
-
 def _write(file: Path, force: bool) -> int:
     # Imported here, so that --help is fast.
     import readline  # noqa: F401 - answers can be edited
@@ -77,7 +62,7 @@ def _write(file: Path, force: bool) -> int:
     dialog = Dialog(_PROGRAM.complain)
     schema, drawing = {SCHEMA: schema_text()}, file.with_suffix('.svg').name
     files = FilesOfFolder(file.parent, replace=True)
-    _check_writable(file.parent, (file.name, drawing, SCHEMA))  # before any answer is lost
+    files.check((file.name, drawing, SCHEMA))  # before any answer is lost
     existing = ', '.join(files.existing((file.name, drawing), schema))
     if existing and not force and dialog.choose(f'{existing} exists; replace it?', NO, YES) == NO:
         raise StewartError(f'{existing}: exists and is kept; nothing is written')
