@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 import math
 
 import numpy as np
@@ -31,6 +32,8 @@ _ATTEMPTS = 5
 _UPRIGHT = 0.9
 
 Check = Callable[[RecordedMotion], bool]
+_Scale = Callable[[Array], Callable[[float], Array]]
+"""From rows of motion to a function that returns them with a part of their size or speed."""
 
 
 def possible_changes(platform: StewartPlatform, recorded: RecordedMotion, check: Check,
@@ -42,10 +45,11 @@ def possible_changes(platform: StewartPlatform, recorded: RecordedMotion, check:
     """
     few = _thinned(recorded)
     found = []
-    for change, scaled in ((AMPLITUDE, _smaller(recorded.motion)), (SPEED, faster)):
-        if scaled is None:
+    for change, scale in ((AMPLITUDE, _smaller(recorded.motion)),
+                          (SPEED, lambda rows: partial(faster, rows))):
+        if scale is None:
             continue
-        percent = _largest_percent(scaled, recorded, few, check)
+        percent = _largest_percent(scale, recorded, few, check)
         if percent:
             found.append(PossibleChange(
                 change, percent / 100.0, f'at {percent} % of its {change}'))
@@ -62,9 +66,9 @@ def in_words(changes: list[PossibleChange]) -> str:
     return last and f'possible {", ".join(first)}{", or " if first else ""}{last}'
 
 
-def _smaller(motion: Motion) -> Callable[[Array, float], Array] | None:
+def _smaller(motion: Motion) -> _Scale | None:
     """
-    Return a function that makes rows of motion smaller about the first pose of a motion.
+    Return the scale that makes rows of motion smaller about the first pose of a motion.
 
     None: the motion turns by half a turn or more from there, where rotation vectors jump.
     """
@@ -72,21 +76,23 @@ def _smaller(motion: Motion) -> Callable[[Array, float], Array] | None:
     turns = Deviations(start, motion.rows).changes[:, 0, 3:]
     if (np.linalg.norm(np.diff(turns, axis=0), axis=1) > np.pi).any():
         return None
-    return lambda rows, factor: Deviations(start, rows).at(factor)
+    return lambda rows: Deviations(start, rows).at
 
 
-def _largest_percent(scaled: Callable[[Array, float], Array], recorded: RecordedMotion,
-                     few: RecordedMotion, check: Check) -> int:
+def _largest_percent(scale: _Scale, recorded: RecordedMotion, few: RecordedMotion,
+                     check: Check) -> int:
     """Return the largest percentage of a motion that is possible; 0 without one."""
-    def is_possible(percent: int, of: RecordedMotion) -> bool:
-        return check(of._replace(motion=Motion.of_rows(scaled(of.motion.rows, percent / 100.0))))
+    def checked(of: RecordedMotion) -> Callable[[int], bool]:
+        scaled = scale(of.motion.rows)
+        return lambda percent: check(of._replace(motion=Motion.of_rows(scaled(percent / 100.0))))
 
+    of_few, of_all = checked(few), checked(recorded)
     low, high = 0, 100
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (middle, high) if is_possible(middle, few) else (low, middle)
+        low, high = (middle, high) if of_few(middle) else (low, middle)
     return next((percent for percent in range(low, max(low - _ATTEMPTS, 0), -1)
-                 if is_possible(percent, recorded)), 0)
+                 if of_all(percent)), 0)
 
 
 def _away(platform: StewartPlatform) -> tuple[Array, float]:
