@@ -45,7 +45,7 @@ LATER = 10_000_000_000  # the legs can be anywhere then [ns]
 LEAPING = Sample(accel=(0.0, 0.0, 100.0, 0.0, 0.0, 0.0))
 
 
-# What a service, a subscriber or an error alone needs, and what other programs need.
+# Modules for a service, a subscriber or an error alone, and those of other programs.
 UNUSED = (
     'argparse', 'difflib', 'jinja2', 'mcap', 'msgspec', 'orjson', 'plotly', 'rosbags', 'scipy',
     'statistics', 'xml', 'stewart_dynamics.capability', 'stewart_dynamics.identification',
