@@ -211,9 +211,10 @@ def joined(given: dict[str, Any], found: list[tuple[str, int, bytes]], cuts: lis
     if cuts is None:
         take = getattr(setpoints, 'join_message', None) or (
             lambda topic, data, now: setpoints.take([(topic, data, now)]))
+        check = getattr(setpoints, 'check_samples', None) or setpoints.judge
         for topic, at, data in found:
             batches.append(take(topic, data, lambda at=at: at))
-            setpoints.judge()
+            check()
     else:
         build: Any = Messages
         from_bytes = build.from_bytes if hasattr(build, 'from_bytes') else build.of
@@ -222,7 +223,7 @@ def joined(given: dict[str, Any], found: list[tuple[str, int, bytes]], cuts: lis
         take = getattr(setpoints, 'join_messages', None) or setpoints.take
         for first, end in pairwise([0, *cuts, len(found)]):
             batches.append(take(whole.chosen(slice(first, end))))
-    setpoints.end('the bag ends')
+    (getattr(setpoints, 'drop_waiting', None) or setpoints.end)('the bag ends')
     firsts: dict[Any, str] = {}
     for rejection, details in said:
         firsts.setdefault(rejection, details)

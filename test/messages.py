@@ -98,7 +98,7 @@ def check_many(one: Feed, many: Feed, given: Sequence[tuple[str, bytes]], topics
     assert number == len(expected)
     assert many.notices == one.notices
     for feed in (one, many):
-        feed.setpoints.end('the bag ends')
+        feed.setpoints.drop_waiting('the bag ends')
     assert many.counts == one.counts
     return number
 

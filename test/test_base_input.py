@@ -306,7 +306,7 @@ def test_a_topic_that_is_missing_leaves_nothing_and_is_counted() -> None:
     for n in range(3):
         feed(BASE_POSE, sample((BASE_POSE,), SECOND + n * MS)[0][1])
     assert feed.row(SECOND)[0] != feed.row(SECOND + MS)[0]  # nan
-    feed.setpoints.end('the bag ends')
+    feed.setpoints.drop_waiting('the bag ends')
     assert feed.counts[BASE_POSE, NOT_JOINED] == 3
 
 

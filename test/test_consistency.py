@@ -362,7 +362,7 @@ def test_pieces_give_the_same_as_the_whole(rate: float) -> None:
     for stamp, row, restart in zip(stamps.tolist(), rows.tolist(), restarts.tolist(),
                                    strict=True):
         ones.noted.append((stamp, row, restart))
-        ones.judge()
+        ones.check_samples()
     for each in (whole, pieces, ones):
         each.finish()
     assert whole.found
@@ -380,7 +380,7 @@ def test_nothing_is_imported_while_setpoints_are_answered() -> None:
         'before, check = {*sys.modules}, Consistency(0.3)\n'
         'for n, row in enumerate(rows.tolist()):\n'
         '    check.noted.append((n * 1_000_000, row, False))\n'
-        '    check.judge()\n'
+        '    check.check_samples()\n'
         'print(sorted({*sys.modules} - before), sorted(check.present))\n')
     done = run_program(sys.executable, '-c', script)
     assert done.out == "[] ['acceleration', 'velocity']\n"
@@ -429,9 +429,8 @@ def errors_of(rows: Array, topics: tuple[str, str, str], **given: Any) -> list[t
     feed = messages.Feed(symmetric_parameters().replaced(
         {name.replace('__', '.'): value for name, value in given.items()}))
     take(feed, rows, 100.0, topics)
-    feed.setpoints.end('')
-    return [(each.topic, each.text.split(': ')[0])
-            for each in feed.setpoints.possible_errors(ever=True)]
+    feed.setpoints.drop_waiting('')
+    return [(each.topic, each.text.split(': ')[0]) for each in feed.setpoints.possible_errors(ever=True)]
 
 
 def test_possible_errors_are_those_of_the_topics() -> None:
@@ -471,7 +470,7 @@ def test_the_possible_error_in_poses_is_named_before_twists_that_are_not_their_d
     feed = messages.Feed(LIMITED)
     mistaken(rows)
     take(feed, rows, 100.0, (POSES, TWISTS, ACCELS))
-    feed.setpoints.end('')
+    feed.setpoints.drop_waiting('')
     for ever, which in ((True, 'first'), (False, 'last')):
         pose, twist, *others = feed.setpoints.possible_errors(ever)
         assert (pose.topic, pose.text) == (POSES, f'{which} setpoint: possible error: {text}')
@@ -492,7 +491,7 @@ def test_gravity_in_the_acceleration_of_a_base_at_rest_is_named() -> None:
     rows[:, LINEAR_ACCELERATION.start + 2] = 9.80665
     feed = messages.Feed(symmetric_parameters().replaced({'base.source': 'motion'}))
     take(feed, rows, 100.0, (BASE_POSE, BASE_TWIST, BASE_ACCEL))
-    feed.setpoints.end('')
+    feed.setpoints.drop_waiting('')
     one, = feed.setpoints.possible_errors(ever=True)
     assert one.topic == BASE_ACCEL
     assert one.text.endswith('possible error: gravity is in it, [0, 0, 9.81] m/s^2?')

@@ -58,7 +58,7 @@ def summary_of(p: Parameters, motion: Motion, times: Array, edges: list[int],
         block = setpoints(motion, times).chosen(slice(first, end))
         outputs = step(block, state)
         state = outputs.state
-        summary.add(Answered(times[first:end], block, outputs, base(block),
+        summary.add_block(Answered(times[first:end], block, outputs, base(block),
                              powers_of(StewartPlatform(p), block, outputs)))
     to_json(summary.values())
     return motion_of(summary)

@@ -79,7 +79,7 @@ class Given:
     def summary(self, **changes: Any) -> BagSummary:
         """Return what summary.json would hold."""
         summary = Summary(self.parameters)
-        summary.add(self.answered())
+        summary.add_block(self.answered())
         return replace(summary.values(), **{
             'version': 1, 'software': 'stewart_dynamics 0.1.0', 'bag': 'bags/example', 'run': '',
             'complete': True, 'missing': [], 'notices': [],
@@ -91,12 +91,12 @@ class Given:
     def report(self, measured: bool = False) -> Report:
         report = Report(self.parameters, measured)
         if len(self.seconds):
-            report.add(self.answered())
+            report.add_block(self.answered())
         return report
 
     def write(self, path: Path, **changes: Any) -> BagSummary:
         summary = self.summary(**changes)
-        self.report().write(path, summary)
+        self.report().write_page(path, summary)
         return summary
 
 
@@ -141,7 +141,7 @@ def write_measured(given: Given, path: Path, pushed: slice = slice(200, 260)) ->
             comparison.add_setpoints(given.seconds, given.setpoints, given.outputs),
             comparison.finish()):
         report.add_measured(*compared)
-    report.write(path, given.summary(measured=comparison.values()))
+    report.write_page(path, given.summary(measured=comparison.values()))
 
 
 def text_of(path: Path) -> str:
@@ -177,10 +177,10 @@ def test_a_million_setpoints_fit_into_ten_megabytes(tmp_path: Path) -> None:
     report = Report(PARAMETERS, measured=True)
     noise = np.random.default_rng(1).standard_normal((4, 5000, 6))
     for n in range(200):
-        report.add(block.answered(later=5.0 * n))
+        report.add_block(block.answered(later=5.0 * n))
         report.add_measured(5.0 * n + block.seconds, *noise[:3])
     path = tmp_path / 'report.html'
-    report.write(path, block.summary())
+    report.write_page(path, block.summary())
     assert data_of(path)['samples'] == 1_000_000
     assert path.stat().st_size < 10e6
 
@@ -226,8 +226,8 @@ def test_angles_are_those_of_the_paper_and_continue_past_half_a_turn(tmp_path: P
     given = Given(seconds, motion.rows)
     report = Report(PARAMETERS)
     for part in (slice(0, 150), slice(150, 151), slice(151, 400)):
-        report.add(given.answered(part))
-    report.write(tmp_path / 'report.html', given.summary())
+        report.add_block(given.answered(part))
+    report.write_page(tmp_path / 'report.html', given.summary())
     data = data_of(tmp_path / 'report.html')
     drawn = np.stack([curve_of(data, 'angles', n)[1] for n in range(3)], axis=1)
     np.testing.assert_allclose(drawn, np.degrees(angles), atol=1e-4)
@@ -394,7 +394,7 @@ def test_missing_plotly_is_reported_in_one_line(
     plotly_script.cache_clear()
     path = tmp_path / 'report.html'
     with snapshot.raises(StewartError) as caught:
-        Report(PARAMETERS).write(path, bag_summary())
+        Report(PARAMETERS).write_page(path, bag_summary())
     assert '\n' not in str(caught.value)
     assert not path.exists()
 
@@ -670,7 +670,7 @@ def test_reports_share_a_file_of_plotly(opened: Callable[..., Opened], tmp_path:
     assert share_plotly(tmp_path / 'all bags') == shared
 
     def write(path: Path) -> None:
-        given.report().write(path, given.summary(), shared)
+        given.report().write_page(path, given.summary(), shared)
 
     report = opened(given, write, checked=False)
     assert (tmp_path / 'report.html').stat().st_size < 2_000_000

@@ -350,7 +350,7 @@ def test_a_topic_that_arrives_earlier_is_not_joined_late(order: Sequence[str]) -
     assert feed.used([*without_stamps((1.0, 2.0, 3.0), order[:2]), (order[2], 3.0)]) == [3.0]
     assert feed.counts == {(topic, NOT_JOINED): 2 for topic in order[:2]}
     assert feed.used([(order[0], 4.0)]) == []
-    feed.setpoints.end('the bag ends')
+    feed.setpoints.drop_waiting('the bag ends')
     assert feed.counts[order[0], NOT_JOINED] == 3
 
 

@@ -139,7 +139,7 @@ class Samples:
         """Return the summary of them, given to it in parts."""
         summary = Summary(parameters, quasi_static)
         for part in self.parts(parameters, edges):
-            summary.add(part)
+            summary.add_block(part)
         return summary
 
 
@@ -397,7 +397,7 @@ def test_any_split_gives_the_same_and_can_be_read_before_the_end(
         assert_same(motion_of(split), motion_of(whole))
     early = Summary(parameters)
     for part, end in zip(samples.parts(parameters, edges), [*edges, many], strict=True):
-        early.add(part)
+        early.add_block(part)
         assert early.values().setpoints.answered == end
 
 
@@ -423,7 +423,7 @@ def test_it_keeps_no_samples() -> None:
     def held_after(blocks: int) -> int:
         for n in range(blocks):
             # new arrays: any that the summary keeps would be counted
-            summary.add(Answered(
+            summary.add_block(Answered(
                 samples.seconds + n, setpoints.chosen(np.arange(2000)),
                 part_of(outputs, slice(None)), samples.base_wrenches.copy(),
                 samples.demanded * samples.rates, samples.breakdown.copy()))

@@ -47,7 +47,7 @@ class RateCheck:
             self._recent.clear()
         self._recent.append(measurement)
         self._consistency.noted.append((estimate.stamp, estimate.motion, restart))
-        self._consistency.judge()
+        self._consistency.check_samples()
         found = self._consistency.present
         if not found:
             self.possible_error = None

@@ -264,7 +264,7 @@ class DynamicsNode(ManagedNode[Parameters]):
             self._diagnostics.begins(motion.tolist(), outputs.determinants[0])
         if self._diagnostics.answered(setpoint, outputs, exceedances, came, now):
             self._report()
-        self._setpoints.judge()
+        self._setpoints.check_samples()
 
     def _target(self) -> Target | None:
         if self._last is None:

@@ -91,7 +91,7 @@ class Report:
         self._uncertain = uncertain
         self._operating = OperatingPoints() if parameters.drives else None
 
-    def add(self, block: Answered, bands: Array | None = None) -> None:
+    def add_block(self, block: Answered, bands: Array | None = None) -> None:
         """Add setpoints, at least one, with their breakdown, and the bands of their efforts."""
         seconds, setpoints, outputs, base_wrenches, powers, breakdown = block
         assert breakdown is not None
@@ -142,7 +142,7 @@ class Report:
             'measured': measured, 'computed': computed, 'residual': measured - computed,
             'external_force': wrench[:, :3], 'external_moment': wrench[:, 3:]})
 
-    def write(self, path: Path, summary: BagSummary, plotly: Path | None = None,
+    def write_page(self, path: Path, summary: BagSummary, plotly: Path | None = None,
               followed: Followed | None = None, command: str = '') -> None:
         """
         Write the report; a file that exists is overwritten.

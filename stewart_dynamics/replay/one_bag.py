@@ -114,7 +114,7 @@ def replay(
             summary = replace(run.summary(), fingerprint=made_of)
             write_json(partial / RESULT, summary)
             if run.report is not None:
-                run.report.write(
+                run.report.write_page(
                     partial / REPORT_PAGE, summary, options.plotly, run.followed,
                     options.capability_command(bag))
     return Replayed(bag, folder, summary, summary_text(summary, parameters), code_of(summary))
@@ -237,7 +237,7 @@ class _Run:
 
     def end(self) -> None:
         """Process the end of the bag, and complete the files."""
-        self._setpoints.end('the bag ends')
+        self._setpoints.drop_waiting('the bag ends')
         if self._differentiator is not None:
             self._answer(self._differentiator.finish())
             for reason, number in self._differentiator.left_out.items():
@@ -347,8 +347,8 @@ class _Run:
         if self.report is not None:
             block = block._replace(breakdown=self._breakdown(
                 setpoints.motions, setpoints.wrenches, setpoints.bases))
-            self.report.add(block, bands)
-        self._summary.add(block)
+            self.report.add_block(block, bands)
+        self._summary.add_block(block)
         if self._comparison is not None:
             self._compared(self._comparison.add_setpoints(block.seconds, setpoints, outputs))
         if self._response is not None:

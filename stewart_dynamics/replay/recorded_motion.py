@@ -71,7 +71,7 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         for size in feed_subscribers(recording, [
                 Subscription({name: key for key, name in topics.items()}, join_messages)]):
             progress(size)
-        setpoints.end('the bag ends')
+        setpoints.drop_waiting('the bag ends')
         if splines is not None:
             batches.append(splines.finish())
         missing, notices = list(recording.missing), tuple(recording.notices)

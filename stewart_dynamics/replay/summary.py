@@ -100,7 +100,7 @@ class Summary:
         self._source_squares = Integral(6 * len(self._sources))
         self._has_breakdown = False
 
-    def add(self, block: Answered) -> None:
+    def add_block(self, block: Answered) -> None:
         """Add a block of samples."""
         if not len(block.seconds):
             return

@@ -12,7 +12,7 @@ a delay of a few samples or of a filter explain; all three are estimated from th
 quantity is inconsistent if most windows with enough motion are, in two periods in a row.
 
 Arrays in, no clock. The result does not depend on how samples are split into batches, nor on when
-the work is done: ``judge`` does it in steps, so that no setpoint waits for a whole period.
+the work is done: ``check_samples`` does it in steps, so that no setpoint waits for a whole period.
 """
 
 from __future__ import annotations
@@ -108,9 +108,9 @@ class Consistency:
         self._radius = radius
         self._frame = frame
         self._pending: list[tuple[Stamps, Array, Flags]] = []
-        self._steps: Iterator[None] | None = None  # those that ``judge`` has not yet done
+        self._steps: Iterator[None] | None = None  # those that ``check_samples`` has not yet done
         self.noted: list[tuple[Any, Any, Any]] = []
-        """Single samples for ``judge``: stamp [ns], row of motion, whether time jumped back."""
+        """Single samples not yet checked: stamp [ns], row of motion, whether time jumped back."""
         self._held = 0
         self._due = _GATHERED
         # Tick of the last period's beginning, and that of the next one's at the earliest.
@@ -123,7 +123,7 @@ class Consistency:
         self.present: dict[str, Inconsistency] = {}
         """Those of the last periods with enough motion."""
 
-    def judge(self) -> None:
+    def check_samples(self) -> None:
         """Do one step, a fraction of a millisecond, of the check of the samples noted so far."""
         if self._steps is not None:
             with np.errstate(all='ignore'):  # numbers that overflow are not judged
@@ -134,7 +134,7 @@ class Consistency:
             self._steps = self._take_noted()
 
     def note_samples(self, stamps: Stamps, motions: Array, restarts: Flags) -> None:
-        """Add N samples as ``add`` does; a single one is left to ``judge``."""
+        """Add N samples as ``add`` does; a single one is left to ``check_samples``."""
         if len(stamps) == 1:
             self.noted.append((stamps[0], motions[0], restarts[0]))
         else:

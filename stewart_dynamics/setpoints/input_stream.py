@@ -248,7 +248,7 @@ class InputStream:
         self._progress[_N_EVENTS] = 0
         self.recorded = None
 
-    def end(self, why: str, restart: bool = False) -> None:
+    def drop_waiting(self, why: str, restart: bool = False) -> None:
         """
         Drop and count waiting samples, of setpoints and base.
 

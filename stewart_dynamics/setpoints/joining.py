@@ -112,14 +112,14 @@ class Setpoints:
         text = find_pose_error(self._parameters, motion.tolist(), first=motion is self._first)
         return [MessageError(self.topics[0], f'{which} setpoint: {text}')] if text else []
 
-    def judge(self) -> None:
+    def check_samples(self) -> None:
         """Check setpoints and samples so far, if there are enough; called when there is time."""
         self._note_setpoints()
         for consistency in self._checks:
-            consistency.judge()
+            consistency.check_samples()
 
     def join_message(self, topic: str, data: bytes, clock: Clock) -> Batch:
-        """Return the setpoint that a message completes, if any; ``judge`` checks it."""
+        """Return the setpoint that a message completes, if any; ``check_samples`` checks it."""
         return self._note_joined(self._stream.join_message(topic, data, clock), None)
 
     def join_messages(self, messages: Messages) -> Batch:
@@ -168,16 +168,16 @@ class Setpoints:
                 self._consistency.note_samples(setpoints.stamps, motions, setpoints.restarts)
         self._unchecked.clear()
 
-    def end(self, why: str) -> None:
+    def drop_waiting(self, why: str) -> None:
         """Drop and count waiting samples: no more messages arrive."""
-        self._stream.end(why)
+        self._stream.drop_waiting(why)
         self._note_setpoints()
         for consistency in self._checks:
             consistency.finish()
 
     def restart(self, why: str) -> None:
         """Follow setpoints and base from any time on; the next setpoint is a restart."""
-        self._stream.end(why, restart=True)
+        self._stream.drop_waiting(why, restart=True)
 
     def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
         """Count and report messages that are not used."""
