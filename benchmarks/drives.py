@@ -48,7 +48,7 @@ def measure() -> list[str]:
     """Return the lines for the page."""
     motion = Motion([0.0, 0.0, 1.1], np.eye(3), [0.05, 0.02, 0.03], [0.1, 0.1, 0.1],
                     [1.0, 1.0, 1.0])
-    setpoint = Batch.of(STAMP, motion.rows)
+    setpoint = Batch.from_parts(STAMP, motion.rows)
     cells: list[tuple[str, ...]] = [
         ('', 'step [us]', 'messages [us]', 'step, more [us]', 'messages, more [us]')]
     first = 0.0, 0.0

@@ -428,7 +428,7 @@ def picture_words() -> str:
     """Return how long a picture takes and how large it is."""
     parameters = Parameters.from_yaml(PARAMETERS)
     motion = motion_at(ReferenceMotionParameters(MOTION), np.array([0.3])).rows[0].tolist()
-    setpoint = Batch.of(FIRST_STAMP, motion)
+    setpoint = Batch.from_parts(FIRST_STAMP, motion)
     outputs = Step(parameters)(setpoint)
     assert outputs.answered[0]
     markers = Markers(parameters)

@@ -49,7 +49,7 @@ def checked(parameters: Parameters, result: NDArray[np.float64],
             state: Singularity | None = None, base_known: bool = True,
             ) -> tuple[Singularity, bool]:
     """Return the state of the warning after a result, and whether it exceeds a limit."""
-    setpoint = Batch.of(1, np.zeros(MOTION), bases=None if base_known else NO_BASE)
+    setpoint = Batch.from_parts(1, np.zeros(MOTION), bases=None if base_known else NO_BASE)
     before, output = state_of(state or Singularity()), np.zeros((1, OUTPUT))
     # Limits of joints, clearance and motors are not in a result.
     hexapod = hexapod_structure(parameters.replaced(dict.fromkeys((*OF_JOINTS, CLEARANCE_MIN))))

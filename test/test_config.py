@@ -109,7 +109,7 @@ def test_rviz_shows_every_namespace_of_the_markers_in_the_base_frame() -> None:
     markers = []
     for name, height in (('platform.yaml', 1.1), ('crank_platform.yaml', 0.65)):
         parameters = Parameters.from_yaml(CONFIG / name)
-        home = Batch.of(1, (0.0, 0.0, height, *np.eye(3).ravel(), *(0.0,) * 12))
+        home = Batch.from_parts(1, (0.0, 0.0, height, *np.eye(3).ravel(), *(0.0,) * 12))
         message = rclpy.deserialize_message(Markers(parameters).write(
             home, Step(parameters)(home)), MarkerArray)
         markers += message.markers

@@ -508,7 +508,7 @@ def test_held_limits_are_ok(snapshot: Snapshot) -> None:
 def test_a_position_in_millimetres_is_named_as_the_possible_error(
         action: str, limited: bool, snapshot: Snapshot) -> None:
     limits = {'limits__length_max': 1.4} if limited else {'limits__velocity_max': 0.5}
-    high = Batch.of(HOME.stamps + 1_000_000, (0.0, 0.0, 1e3, *HOME.motions[0, 3:]))
+    high = Batch.from_parts(HOME.stamps + 1_000_000, (0.0, 0.0, 1e3, *HOME.motions[0, 3:]))
     step = Step(PARAMETERS.replaced({
         'limits.action': action, **{k.replace('__', '.'): v for k, v in limits.items()}}))
     outputs = step(high, step(HOME).state)
@@ -661,7 +661,7 @@ def test_every_value_is_finite_and_every_key_has_its_unit(
     _check_values(diagnostics, now)
     for stamp, (position, rotation, rates, pause) in enumerate(motions):
         now += pause
-        setpoint = Batch.of(stamp, (*position, *rotation, *rates))
+        setpoint = Batch.from_parts(stamp, (*position, *rotation, *rates))
         outputs = step(setpoint, state)
         state = outputs.state
         if outputs.answered[0]:

@@ -60,7 +60,7 @@ def batch_of(times: Array, motions: Array, restarts: Any = ()) -> Batch:
     stamps = START + np.round(times * 1e9).astype(np.int64)
     wrenches = np.arange(6.0 * len(times)).reshape(-1, 6)
     bases = np.arange(1.0, 12.0 * len(times) + 1.0).reshape(-1, 12)
-    return Batch.of(stamps, rows, wrenches, flags, stamps + 1000, bases)
+    return Batch.from_parts(stamps, rows, wrenches, flags, stamps + 1000, bases)
 
 
 def pieces(batch: Batch, cuts: Any) -> Iterator[Batch]:
@@ -391,7 +391,7 @@ def test_poses_that_turn_too_fast_for_the_cutoff_are_left_out_and_counted() -> N
 def test_one_wrench_for_all_is_given_to_each(far: int) -> None:
     times = np.arange(0.0, 1.0, 1e-2)
     poses = batch_of(times, motion_at(times).rows)
-    batch = Batch.of(poses.stamps, poses.motions, np.arange(6.0))
+    batch = Batch.from_parts(poses.stamps, poses.motions, np.arange(6.0))
     batch.motions[:far, 2] = 1e10
     done = differentiated(Differentiator(10.0, 0.1), [batch])
     assert np.array_equal(done.wrenches, np.tile(np.arange(6.0), (100 - far, 1)))
@@ -404,7 +404,7 @@ def test_every_setpoint_keeps_its_base_and_a_still_base_stays_still() -> None:
     assert done.bases is not None
     assert np.array_equal(done.bases, batch.bases)
     still = Differentiator(10.0, 0.1)
-    still.add_setpoints(Batch.of(batch.stamps, batch.motions))
+    still.add_setpoints(Batch.from_parts(batch.stamps, batch.motions))
     assert still.finish().bases is None
 
 

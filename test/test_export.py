@@ -313,7 +313,7 @@ def test_steps_are_those_of_the_node(library: ctypes.CDLL) -> None:
         step, state, drives = Step(p), FIRST, Drives(p)
         results = np.zeros((count, RESULT))
         for n in range(count):
-            setpoint = Batch.of(
+            setpoint = Batch.from_parts(
                 stamps[n], motions[n], wrenches[n] if given[n] & HAS_WRENCH else 0.0,
                 bases=bases[n] if given[n] & HAS_BASE else None)
             output = step(setpoint, state)
@@ -693,8 +693,8 @@ def test_golden_csv_is_read_as_it_was_computed(exported: Path) -> None:
     step, state = Step(Parameters.from_yaml(PLATFORM_FILE)), FIRST
     for row in rows:
         numbers = [row[name] for name in names]
-        output = step(Batch.of(int(row['stamp']), numbers[2:26], numbers[26:32],
-                               bases=numbers[32:44] if row['has_base'] else None), state)
+        output = step(Batch.from_parts(int(row['stamp']), numbers[2:26], numbers[26:32],
+                                       bases=numbers[32:44] if row['has_base'] else None), state)
         assert output.with_efforts.tolist() == [True]
         state = output.state
         assert [row[f'force_{leg}'] for leg in range(1, 7)] == output.efforts[0].tolist()

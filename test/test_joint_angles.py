@@ -169,7 +169,7 @@ def test_the_step_reports_angles_above_their_limit_for_one_and_for_many() -> Non
     motion, angles = moved()
     base, platform = 0.9 * angles[:, :6].max(), 0.8 * angles[:, 6:].max()
     step = Step(SYMMETRIC.replaced({BASE_ANGLE_MAX: base, PLATFORM_ANGLE_MAX: platform}))
-    setpoints = Batch.of(np.arange(101), motion.rows)
+    setpoints = Batch.from_parts(np.arange(101), motion.rows)
     many = step(setpoints)
     assert np.array_equal(many.joint_angles, angles)
     for n, (output, found) in enumerate(each_alone(step, setpoints)):

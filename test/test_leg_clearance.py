@@ -182,7 +182,7 @@ def test_a_message_names_what_a_leg_is_near_to() -> None:
     row = Motion.from_pose(home).rows
     for changes, other in (({}, 'leg_2'), ({OUTLINES[1]: square}, OUTLINES[1])):
         p = SYMMETRIC.replaced({CLEARANCE_MIN: 1.0, **changes})
-        step, setpoint = Step(p), Batch.of(0, row)
+        step, setpoint = Step(p), Batch.from_parts(0, row)
         found = step.exceedances(step(setpoint))
         assert f'leg_1: clearance to {other}, ' in found[0].words(p['joints'])
         result = check_planned_trajectory(
@@ -216,7 +216,7 @@ def test_the_step_reports_a_clearance_below_its_limit_for_one_and_for_many() -> 
     motion = lowered(np.linspace(0.0, 0.2, 51))
     clearances = LegClearance(LOWERING)(motion.rows)
     bound = 0.1
-    setpoints = Batch.of(np.arange(51), motion.rows)
+    setpoints = Batch.from_parts(np.arange(51), motion.rows)
     step = Step(LOWERING.replaced({CLEARANCE_MIN: bound}))
     many = step(setpoints)
     assert np.array_equal(many.clearances, clearances)

@@ -274,7 +274,7 @@ near(matrix @ linear_parameters(with_rotor.parameters), forces)
 rows = with_rotor.forward_dynamics(motion, forces, None, base).linear_acceleration
 near(rows, motion.linear_acceleration)
 # The step of node and replay: the limits are those of the drive.
-outputs = Step(doubled.replaced({'limits.force_max': 100.0}))(Batch.of(0, motion[0].rows))
+outputs = Step(doubled.replaced({'limits.force_max': 100.0}))(Batch.from_parts(0, motion[0].rows))
 assert np.abs(outputs.records['forces']).max() <= 100.0
 # The governor keeps them, too.
 stream = GovernedStream(doubled)

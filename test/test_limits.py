@@ -32,11 +32,11 @@ home = platform.home_pose()
 motion = Motion(home.position, home.rotation, linear_velocity=[0.0, 0.0, 0.5],
                 linear_acceleration=[0.0, 0.0, 4.0])
 power, step = platform.motors(motion).power, Step(p)
-outputs = step(Batch.of(0, motion.rows))
+outputs = step(Batch.from_parts(0, motion.rows))
 found = [each for each in step.exceedances(outputs) if each.limit == 'drive.power_max']
 assert [each.leg for each in found] == np.flatnonzero(power > 150.0).tolist() != []
 assert np.isnan(outputs.efforts).all()
-assert not step(Batch.of(0, Motion.from_pose(home).rows)).exceeding[0]
+assert not step(Batch.from_parts(0, Motion.from_pose(home).rows)).exceeding[0]
 assert 'drive.power_max: 150 W' in c_project(p, 'rig')['rig.c']
 print(found[0].words(p.joints))
 print(Parameters.table['drive.power_max'].text)

@@ -39,7 +39,7 @@ STAMP = 1_700_000_000_123_456_789
 
 def setpoint(position: tuple[float, ...], rotation: Any = UPRIGHT) -> Batch:
     """Return a setpoint at rest."""
-    return Batch.of(STAMP, (*position, *np.ravel(rotation), *(0.0,) * 12))
+    return Batch.from_parts(STAMP, (*position, *np.ravel(rotation), *(0.0,) * 12))
 
 
 HOME = setpoint((0.0, 0.0, 1.1))
@@ -120,7 +120,8 @@ def hexapods() -> list[tuple[Parameters, Batch]]:
              (HEXAPOD, setpoint((0.0, 0.0, 0.0))), (HEXAPOD, SINGULAR)]
     for _ in range(8):
         parameters = random_parameters(random)
-        cases.append((parameters, Batch.of(STAMP, random_motion(parameters, random, 1).rows)))
+        motion = random_motion(parameters, random, 1)
+        cases.append((parameters, Batch.from_parts(STAMP, motion.rows)))
     return cases
 
 
@@ -429,7 +430,7 @@ def test_markers_show_the_answer(node: DynamicsNode) -> None:
     node.answer(sample, stamp=stamp)
     node.until(lambda: stamp in _stamps(seen), 'it is drawn')
     expected = written(
-        Markers(HEXAPOD), Step(HEXAPOD), Batch.of(stamp, sample.motion().rows))
+        Markers(HEXAPOD), Step(HEXAPOD), Batch.from_parts(stamp, sample.motion().rows))
     assert seen[_stamps(seen).index(stamp)] == deserialize_message(expected, MarkerArray)
 
 

@@ -83,7 +83,7 @@ def case_of(seed: int = 0, many: int = 500, step: float = 0.01,
         size * (wave(0, 0) + [0.0, 0.0, 1.0]), wave(1, 0), size * wave(0, 1), wave(1, 1),
         size * wave(0, 2), wave(1, 2))
     stamp = np.array(stamps) if stamps is not None else START + np.arange(many) * round(step * 1e9)
-    batch = Batch.of(stamp, motion.rows, restarts=np.diff(stamp, prepend=stamp[0]) < 0)
+    batch = Batch.from_parts(stamp, motion.rows, restarts=np.diff(stamp, prepend=stamp[0]) < 0)
     seconds = np.cumsum(np.diff(stamp, prepend=stamp[0]).clip(0)) * 1e-9
     return Case(parameters, motion, seconds, batch, Step(parameters)(batch))
 
@@ -172,7 +172,7 @@ def test_a_load_in_the_model_leaves_no_residual() -> None:
     case = case_of()
     load = rng().uniform(-300.0, 300.0, (500, 6))
     batch = case.setpoints
-    with_load = Batch.of(batch.stamps, batch.motions, load)
+    with_load = Batch.from_parts(batch.stamps, batch.motions, load)
     outputs = Step(case.parameters)(with_load)
     comparison = Comparison(case.parameters)
     _, _, _, wrench = compared(
@@ -470,7 +470,7 @@ def test_standing_still_gives_no_correlation() -> None:
     case = case_of(many=1)
     still = Motion(case.motion.position, case.motion.rotation)
     stamps = START + np.arange(50) * 10_000_000
-    batch = Batch.of(stamps, still.rows)
+    batch = Batch.from_parts(stamps, still.rows)
     outputs = Step(case.parameters)(batch)
     comparison = Comparison(case.parameters)
     comparison.add_setpoints(np.arange(50) * 0.01, batch, outputs)

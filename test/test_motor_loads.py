@@ -46,7 +46,7 @@ TIMES: Array = np.arange(0.0, 8.0, 0.005)
 
 def setpoints(motion: Motion, times: Array) -> Batch:
     """Return the setpoints of a motion."""
-    return Batch.of(np.round((1.0 + times) * SECOND), motion.rows)
+    return Batch.from_parts(np.round((1.0 + times) * SECOND), motion.rows)
 
 
 def summary_of(p: Parameters, motion: Motion, times: Array, edges: list[int],
@@ -59,7 +59,7 @@ def summary_of(p: Parameters, motion: Motion, times: Array, edges: list[int],
         outputs = step(block, state)
         state = outputs.state
         summary.add_block(Answered(times[first:end], block, outputs, base(block),
-                             powers_of(StewartPlatform(p), block, outputs)))
+                                   powers_of(StewartPlatform(p), block, outputs)))
     to_json(summary.values())
     return motion_of(summary)
 

@@ -41,8 +41,8 @@ class Answers(NamedTuple):
 def answers(p: Parameters, motion: Motion, restarts: Any = ()) -> Answers:
     """Return the outputs of setpoints, after a check that they are the same one by one."""
     numbers = np.arange(len(motion.rows))
-    setpoints = Batch.of(STAMP + numbers * 10 ** 8, motion.rows,
-                         restarts=np.isin(numbers, restarts))
+    setpoints = Batch.from_parts(STAMP + numbers * 10 ** 8, motion.rows,
+                                 restarts=np.isin(numbers, restarts))
     step, by, state = Step(p), OutputMessages(p), FIRST
     found = Answers(outputs := answered(step, setpoints), [], [])
     for n, setpoint in enumerate(singles(setpoints)):
@@ -161,7 +161,7 @@ def test_a_setpoint_that_the_legs_cannot_reach_warms_no_winding() -> None:
 def test_without_forces_there_are_angles_and_speeds_alone() -> None:
     p = HEXAPOD.replaced({**PUBLISHED, 'actuator.reflected_mass': None})
     quarter = Motion.from_euler([[0.0, 0.0, 1.0]], [[0.0, 0.0, np.pi / 2]])
-    output = answered(Step(p), Batch.of(STAMP, quarter.rows))
+    output = answered(Step(p), Batch.from_parts(STAMP, quarter.rows))
     assert np.isnan(output.efforts).all()
     assert np.isnan(output.motors[:, BREAKAWAY_TORQUES]).all()
     messages = written(OutputMessages(p), output)
@@ -174,14 +174,14 @@ def test_without_forces_there_are_angles_and_speeds_alone() -> None:
 def test_a_motor_whose_numbers_overflow_is_not_published() -> None:
     p = HEXAPOD.replaced({'actuator.screw_lead': 1e-306, 'drive.gear_ratio': 1.0})
     fast = Motion([0.0, 0.0, 1.0], np.eye(3), [0.0, 0.0, 1e3])
-    step, setpoint = Step(p), Batch.of(STAMP, fast.rows)
+    step, setpoint = Step(p), Batch.from_parts(STAMP, fast.rows)
     output = answered(step, setpoint)
     assert not output.rows[0, FINITE_MOTORS] and not step.exceedances(output)
     assert 'motor_states' not in written(OutputMessages(p), output)
 
 
 def test_nothing_is_computed_without_drives() -> None:
-    output = answered(Step(HEXAPOD.replaced({'actuator.screw_lead': 0.01})), Batch.of(
+    output = answered(Step(HEXAPOD.replaced({'actuator.screw_lead': 0.01})), Batch.from_parts(
         STAMP, Motion([0.0, 0.0, 1.0], np.eye(3)).rows))
     assert output.motors.shape == output.rises.shape == (1, 0)
     assert not state_record(output.state)['copper_heat'].any()

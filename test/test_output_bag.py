@@ -51,7 +51,7 @@ def turning(number: int, first: int = 0) -> Outputs:
     motions[:, 2] = 1.1
     motions[:, 3:12] = from_euler(0.01 * n[:, None] * [0.0, 0.0, 1.0]).reshape(-1, 9)
     motions[:, 17] = 1.0
-    return STEP(Batch.of(1_000_000 * (n + 1), motions))
+    return STEP(Batch.from_parts(1_000_000 * (n + 1), motions))
 
 
 def times_of(number: int, first: int = 0) -> NDArray[np.int64]:
@@ -68,8 +68,9 @@ def base_wrenches_of(outputs: Outputs) -> Array:
 def answered(outputs: Outputs, times: NDArray[np.int64], motions: Array) -> Answered:
     """Return outputs as a block."""
     n = len(outputs.stamps)
-    return Answered(np.arange(n) / 7.0, Batch.of(outputs.stamps, motions, times=times), outputs,
-                    base_wrenches_of(outputs), np.zeros((n, 6)))
+    setpoints = Batch.from_parts(outputs.stamps, motions, times=times)
+    return Answered(np.arange(n) / 7.0, setpoints, outputs, base_wrenches_of(outputs),
+                    np.zeros((n, 6)))
 
 
 def write_bag(folder: Path, blocks: Iterable[tuple[NDArray[np.int64], Outputs]]) -> Path:

@@ -87,7 +87,7 @@ def test_the_warning_is_sent_first_and_then_at_every_change() -> None:
     for angle in [*range(0, 89, 4), *range(88, -1, -4)]:
         half = math.radians(angle) / 2
         rotation = from_quaternion(0.0, 0.0, math.sin(half), math.cos(half))
-        output = answered(STEP, Batch.of(STAMP, (0.0, 0.0, 1.0, *rotation, *REST)), state)
+        output = answered(STEP, Batch.from_parts(STAMP, (0.0, 0.0, 1.0, *rotation, *REST)), state)
         message = decoded(written(MESSAGES, output)).get('singularity_warning')
         if message is not None:
             sent.append(message.data)
@@ -115,7 +115,7 @@ def test_many_messages_are_those_of_one_after_the_other(action: str) -> None:
         'joints': ['a', 'bc', 'def', 'ghij', 'élan', '六']})
     step, by = Step(parameters), OutputMessages(parameters)
     angles = np.radians([*range(60, 90, 3), 90, *range(89, 60, -3)])
-    setpoints = Batch.of(STAMP + np.arange(len(angles)), [
+    setpoints = Batch.from_parts(STAMP + np.arange(len(angles)), [
         (0.0, 0.0, 1.0, *from_quaternion(0.0, 0.0, math.sin(half), math.cos(half)), *REST)
         for half in angles / 2])
     outputs, state = answered(step, setpoints), FIRST
@@ -176,7 +176,7 @@ def _check_finite(step: Step, setpoint: Batch) -> None:
 def test_only_finite_numbers_are_published(
         position: tuple[float, ...], rotation: tuple[float, ...], rates: tuple[float, ...],
         wrench: Six) -> None:
-    setpoint = Batch.of(STAMP, (*position, *rotation, *rates), wrench)
+    setpoint = Batch.from_parts(STAMP, (*position, *rotation, *rates), wrench)
     _check_finite(STEP, setpoint)
     _check_finite(_LIMITED, setpoint)
 
@@ -194,4 +194,4 @@ def test_only_finite_numbers_are_published_for_any_hexapod(
     step = Step(PARAMETERS.replaced({
         'platform.mass': mass, 'legs.piston.mass': leg_mass,
         'geometry.zero_length': zero_length}))
-    _check_finite(step, Batch.of(STAMP, (*position, *rotation, *rates)))
+    _check_finite(step, Batch.from_parts(STAMP, (*position, *rotation, *rates)))

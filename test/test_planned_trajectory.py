@@ -373,7 +373,7 @@ def test_a_limit_of_length_one_rounding_inside_the_pose_is_not_exceeded(
             changes = {limit: bounds.tolist()}
             parameters = FREE.replaced(changes)
             assert check(([0], rows), parameters).accepted != exceeded
-            step, setpoint = Step(parameters), Batch.of(0, motion_of(rows).rows)
+            step, setpoint = Step(parameters), Batch.from_parts(0, motion_of(rows).rows)
             assert bool(step.exceedances(step(setpoint))) == exceeded
             simulated_parameters = simulated(**{**UNLIMITED, **changes})
             if exceeded:

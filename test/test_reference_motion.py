@@ -264,7 +264,7 @@ def test_files_suit_the_hexapod(path: Path, platform: StewartPlatform) -> None:
     assert np.all(np.abs(result.rates) <= p['limits.velocity_max'])
     singular = path.stem == 'trajectory_singular'
     assert np.any(np.abs(result.forces) > p['limits.force_max']) == singular
-    answers = Step(p)(Batch.of(np.arange(len(times)), motion_at(motion, times).rows))
+    answers = Step(p)(Batch.from_parts(np.arange(len(times)), motion_at(motion, times).rows))
     assert np.any(answers.warnings) == singular
     assert singular or result.condition_number.max() < 5.0
 

@@ -61,7 +61,7 @@ class Given:
                  bases: Array | None = None) -> None:
         self.seconds, self.motions, self.parameters = seconds, motions, parameters
         stamps = 1_700_000_000_000_000_000 + np.rint(seconds * 1e9).astype(np.int64)
-        self.setpoints = Batch.of(stamps, motions, bases=bases)
+        self.setpoints = Batch.from_parts(stamps, motions, bases=bases)
         self.outputs = Step(parameters)(self.setpoints)
         self.base_wrenches = BaseWrench(parameters)(self.setpoints)
         self.powers = powers_of(StewartPlatform(parameters), self.setpoints, self.outputs)

@@ -218,7 +218,7 @@ def assert_steps(program: Path, p: Parameters, motions: Array, wrenches: Array, 
     done = subprocess.run([program], input=text.encode(), capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b'')
     found = np.frombuffer(done.stdout, record('stewart_output'))
-    outputs = Step(p)(Batch.of(stamps, motions, wrenches))
+    outputs = Step(p)(Batch.from_parts(stamps, motions, wrenches))
     expected = outputs.records.copy()
     # Without forces: those of C are zero, those of Python nan.
     unknown = ~outputs.with_efforts

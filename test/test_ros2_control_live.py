@@ -284,7 +284,7 @@ def test_forces_on_an_imu_have_the_bits_of_the_node(program: Path, every: int) -
     assert ((found['code'] == CODES['STEWART_OK']) == known).all()
     rows_found = np.ascontiguousarray(found['base']).view(np.float64).reshape(count, -1)
     assert rows_found[known].tobytes() == expected[known].tobytes()
-    outputs = Step(p)(Batch.of(
+    outputs = Step(p)(Batch.from_parts(
         [cycle.stamp for cycle in cycles], motions.rows, [cycle.wrench for cycle in cycles],
         bases=np.where(known[:, None], expected, NO_BASE)))
     efforts = outputs.records['forces']

@@ -152,14 +152,14 @@ def test_a_combined_message_is_a_setpoint() -> None:
     assert feed.setpoints.topics == (COMBINED,)
     setpoint = feed(COMBINED, messages.combined(
         SECOND, (0.1, 0.2, 1.3), UPRIGHT, (1, 2, 3, 4, 5, 6), (7, 8, 9, 10, 11, 12)))
-    check_same(setpoint, Batch.of(
+    check_same(setpoint, Batch.from_parts(
         SECOND, (0.1, 0.2, 1.3, 1, 0, 0, 0, 1, 0, 0, 0, 1, *range(1, 13))))
 
 
 def test_a_pose_alone_stands_still() -> None:
     feed = Feed(source='pose')
     assert feed.setpoints.topics == (POSE,)
-    check_same(feed.sample(POSE, SECOND, 0.25), Batch.of(
+    check_same(feed.sample(POSE, SECOND, 0.25), Batch.from_parts(
         SECOND, (0.25, 0.0, 1.1, 1, 0, 0, 0, 1, 0, 0, 0, 1) + (0.0,) * 12))
 
 

@@ -38,16 +38,16 @@ REST = (0.0,) * 12
 STAMP = 12_000_000_034
 
 # The hexapod turned as far as it is singular, and its legs and platform in one plane.
-QUARTER = Batch.of(STAMP, (0.0, 0.0, 1.0, *QUARTER_TURN.ravel(), *REST))
-FLAT = Batch.of(STAMP, (0.0, 0.0, 0.0, *UPRIGHT, *REST))
-HOME = Batch.of(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *REST))
+QUARTER = Batch.from_parts(STAMP, (0.0, 0.0, 1.0, *QUARTER_TURN.ravel(), *REST))
+FLAT = Batch.from_parts(STAMP, (0.0, 0.0, 0.0, *UPRIGHT, *REST))
+HOME = Batch.from_parts(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *REST))
 
 
 def random_setpoints(parameters: Parameters, many: int) -> Batch:
     """Return random setpoints that suit a hexapod."""
     random = rng()
-    return Batch.of(STAMP + np.arange(many), random_motion(parameters, random, many).rows,
-                    random_wrench(parameters, random, many))
+    return Batch.from_parts(STAMP + np.arange(many), random_motion(parameters, random, many).rows,
+                            random_wrench(parameters, random, many))
 
 
 def singles(setpoints: Batch) -> list[Batch]:
@@ -141,8 +141,8 @@ RATE = 0.5  # a leg's limit [m/s]
 
 def at(height: float, milliseconds: float, **changes: bool) -> Batch:
     """Return a setpoint at rest at a height and a time."""
-    return Batch.of(STAMP + round(milliseconds * 1e6), (0.0, 0.0, height, *UPRIGHT, *REST),
-                    **changes)
+    return Batch.from_parts(STAMP + round(milliseconds * 1e6), (0.0, 0.0, height, *UPRIGHT, *REST),
+                            **changes)
 
 
 def both_ways(step: Step, setpoints: Sequence[Batch]) -> Outputs:
@@ -246,7 +246,7 @@ def test_a_motion_at_the_rate_limit_is_no_jump() -> None:
 
 def _turned(degrees: float) -> Batch:
     half = math.radians(degrees) / 2
-    return Batch.of(STAMP, (
+    return Batch.from_parts(STAMP, (
         0.0, 0.0, 1.0, *from_quaternion(0.0, 0.0, math.sin(half), math.cos(half)), *REST))
 
 
@@ -279,7 +279,7 @@ def test_a_suppressed_force_above_its_limit_is_still_reported() -> None:
 
 
 @pytest.mark.parametrize('setpoint', [
-    QUARTER, FLAT, Batch.of(STAMP, (*(
+    QUARTER, FLAT, Batch.from_parts(STAMP, (*(
         PARAMETERS['geometry.base_joints'][2] - PARAMETERS['geometry.platform_joints'][2]
     ), *UPRIGHT, *REST))], ids=['a quarter turn', 'flat', 'a leg without length'])
 def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Batch) -> None:
@@ -299,12 +299,12 @@ def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Batc
 # Numbers that overflow
 
 @pytest.mark.parametrize('setpoint', [
-    Batch.of(STAMP, (1e200, 0.0, 1.0, *UPRIGHT, *REST)),
-    Batch.of(STAMP, (0.0, 0.0, 1e308, *UPRIGHT, *REST)),
-    Batch.of(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 3, *(1e200,) * 3, *(0.0,) * 6)),
-    Batch.of(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 6, *(1e308,) * 6)),
-    Batch.of(STAMP, HOME.motions, (1e308,) * 6),
-    Batch.of(2 ** 31 * 10 ** 9, HOME.motions), Batch.of(-2 ** 63, HOME.motions)],
+    Batch.from_parts(STAMP, (1e200, 0.0, 1.0, *UPRIGHT, *REST)),
+    Batch.from_parts(STAMP, (0.0, 0.0, 1e308, *UPRIGHT, *REST)),
+    Batch.from_parts(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 3, *(1e200,) * 3, *(0.0,) * 6)),
+    Batch.from_parts(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 6, *(1e308,) * 6)),
+    Batch.from_parts(STAMP, HOME.motions, (1e308,) * 6),
+    Batch.from_parts(2 ** 31 * 10 ** 9, HOME.motions), Batch.from_parts(-2 ** 63, HOME.motions)],
     ids=['far', 'farther', 'turning', 'accelerated', 'loaded', 'after 2038', 'before 1901'])
 def test_a_setpoint_that_overflows_gives_nothing(setpoint: Batch) -> None:
     output = STEP(setpoint)
@@ -352,7 +352,7 @@ def test_the_base_wrench_is_the_librarys_bit_for_bit(moving: bool) -> None:
         motion = random_motion(parameters, random, MANY)
         wrenches = random_wrench(parameters, random, MANY)
         base = random_base_motion(parameters, random, MANY) if moving else None
-        found = base_wrenches(parameters, Batch.of(
+        found = base_wrenches(parameters, Batch.from_parts(
             STAMPS, motion.rows, wrenches, bases=None if base is None else base.rows))
         assert np.array_equal(
             found, StewartPlatform(parameters).base_wrench(motion, wrenches, base))
@@ -364,7 +364,7 @@ def test_an_unknown_base_and_overflowing_numbers_have_no_base_wrench() -> None:
     bases = random_base_motion(PARAMETERS, random, MANY).rows.copy()
     bases[10:20] = NO_BASE
     motions[20:25, 18:21] = 1e308
-    found = base_wrenches(PARAMETERS, Batch.of(
+    found = base_wrenches(PARAMETERS, Batch.from_parts(
         STAMPS, motions, random_wrench(PARAMETERS, random, MANY), bases=bases))
     assert np.flatnonzero(np.isnan(found).all(axis=1)).tolist() == list(range(10, 25))
     assert np.isnan(found).sum() == 15 * 6
@@ -381,7 +381,7 @@ def test_at_rest_it_is_the_weight_also_where_the_forces_cannot_be_solved(
     found = BaseWrench(PARAMETERS)(setpoint)[0]
     assert relative(found[:3], weight_of(PARAMETERS) * PARAMETERS['gravity']) < 1e-12
     tilted = BaseMotion([0.0, 6.0, -8.0])
-    found = BaseWrench(PARAMETERS)(Batch.of(STAMP, setpoint.motions, bases=tilted.rows))[0]
+    found = BaseWrench(PARAMETERS)(Batch.from_parts(STAMP, setpoint.motions, bases=tilted.rows))[0]
     assert relative(found[:3], weight_of(PARAMETERS) * tilted.gravity) < 1e-12
 
 
@@ -486,7 +486,7 @@ def test_the_time_to_a_dead_centre_is_that_of_the_square_of_the_lever() -> None:
     rate = (after - squares) / h
     with np.errstate(divide='ignore'):
         expected = np.where(rate < 0.0, ((0.1 * size) ** 2 - squares) / rate, np.inf)
-    found = step(Batch.of(np.arange(40), rows)).lever_times
+    found = step(Batch.from_parts(np.arange(40), rows)).lever_times
     near = np.isfinite(expected) & (expected < 10.0)
     assert near.sum() > 60
     np.testing.assert_allclose(found[near], expected[near], rtol=1e-4)

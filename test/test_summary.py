@@ -118,8 +118,8 @@ class Samples:
         many = len(self.seconds)
         bases = np.zeros((many, BASE))
         bases[self.base_unknown] = NO_BASE
-        return Batch.of(self.stamps, np.zeros((many, MOTION)), restarts=self.restarts,
-                        bases=bases if self.base_unknown.any() else None)
+        return Batch.from_parts(self.stamps, np.zeros((many, MOTION)), restarts=self.restarts,
+                                bases=bases if self.base_unknown.any() else None)
 
     def parts(self, parameters: Parameters, edges: Sequence[int] = ()) -> Iterator[Answered]:
         """Return them as the replay gives them, in blocks with these edges."""

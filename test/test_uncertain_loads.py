@@ -39,7 +39,7 @@ def loads(p: Parameters, rows: Any, count: int, parts: int = 1) -> tuple[Uncerta
     """Return the loads of motions, added in parts, and the bands."""
     found, bands = UncertainLoads(p, count), []
     for part in np.array_split(np.arange(len(rows)), parts):
-        setpoints = Batch.of(10_000_000 * part, rows[part])
+        setpoints = Batch.from_parts(10_000_000 * part, rows[part])
         outputs = Step(p)(setpoints, FIRST)
         none = np.zeros((len(part), 6))
         bands.append(found.add(Answered(part * 0.01, setpoints, outputs, none, none)))

@@ -122,7 +122,7 @@ def golden_vectors(parameters: Parameters) -> Array:
     rows, state = [], FIRST
     for n in range(_COUNT):
         stamp, moving = n * _PERIOD, n % 3 == 2
-        outputs = step(Batch.of(
+        outputs = step(Batch.from_parts(
             stamp, motions[n], wrenches[n], bases=bases[n] if moving else None), state)
         state = outputs.state
         if not outputs.answered[0]:

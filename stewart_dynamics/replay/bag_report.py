@@ -143,7 +143,7 @@ class Report:
             'external_force': wrench[:, :3], 'external_moment': wrench[:, 3:]})
 
     def write_page(self, path: Path, summary: BagSummary, plotly: Path | None = None,
-              followed: Followed | None = None, command: str = '') -> None:
+                   followed: Followed | None = None, command: str = '') -> None:
         """
         Write the report; a file that exists is overwritten.
 

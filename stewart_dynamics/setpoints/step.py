@@ -66,9 +66,9 @@ class Batch(NamedTuple):
     moving: bool  # whether the base moves; False: it is fixed
 
     @classmethod
-    def of(cls, stamps: ArrayLike, motions: ArrayLike, wrenches: ArrayLike = NO_WRENCH,
-           restarts: ArrayLike = False, times: ArrayLike | None = None,
-           bases: ArrayLike | None = None, stamped: ArrayLike = True) -> Batch:
+    def from_parts(cls, stamps: ArrayLike, motions: ArrayLike, wrenches: ArrayLike = NO_WRENCH,
+                   restarts: ArrayLike = False, times: ArrayLike | None = None,
+                   bases: ArrayLike | None = None, stamped: ArrayLike = True) -> Batch:
         """
         Return N setpoints, or a single one; a value that is the same for all may be given once.
 
@@ -93,7 +93,7 @@ class Batch(NamedTuple):
         if len(batches) == 1:
             return batches[0]
         if not batches:
-            return cls.of([], np.empty((0, MOTION)))
+            return cls.from_parts([], np.empty((0, MOTION)))
         stamps, rows, times, moving = zip(*batches, strict=True)
         return cls(np.concatenate(stamps), np.concatenate(rows), np.concatenate(times), moving[0])
 
