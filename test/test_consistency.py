@@ -29,7 +29,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.reference_motion.motion_functions import motion_at
 from stewart_dynamics.reference_motion.motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.setpoints.consistency import Consistency
-from stewart_dynamics.setpoints.inconsistency import (
+from stewart_dynamics.setpoints.inconsistency_causes import (
     ACCELERATION as ACCEL, Inconsistency, SPIN, SPIN_RATE, VELOCITY)
 from stewart_dynamics.setpoints.input_messages import (
     ACCEL as ACCELS, BASE_ACCEL, BASE_POSE, BASE_TWIST, POSE as POSES, TWIST as TWISTS)
@@ -430,7 +430,8 @@ def errors_of(rows: Array, topics: tuple[str, str, str], **given: Any) -> list[t
         {name.replace('__', '.'): value for name, value in given.items()}))
     take(feed, rows, 100.0, topics)
     feed.setpoints.drop_waiting('')
-    return [(each.topic, each.text.split(': ')[0]) for each in feed.setpoints.possible_errors(ever=True)]
+    return [(each.topic, each.text.split(': ')[0])
+            for each in feed.setpoints.possible_errors(ever=True)]
 
 
 def test_possible_errors_are_those_of_the_topics() -> None:

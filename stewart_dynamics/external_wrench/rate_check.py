@@ -22,7 +22,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.possible_errors.hypothesis import PossibleError
 from stewart_dynamics.possible_errors.transforms import best_order
 from stewart_dynamics.setpoints.consistency import Consistency
-from stewart_dynamics.setpoints.inconsistency import reason_of, Sums, VELOCITY
+from stewart_dynamics.setpoints.inconsistency_causes import reason_of, Sums, VELOCITY
 
 # Measurements in which legs and reason are found, and the length of windows in them [s].
 _RECENT, _WINDOW = 2000, 0.05

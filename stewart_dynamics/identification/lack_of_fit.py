@@ -32,8 +32,8 @@ from stewart_dynamics.estimation.contradiction import (
     Contradiction, deviations, UNCERTAIN, WIDENING)
 from stewart_dynamics.estimation.posterior import Posterior, posterior
 from stewart_dynamics.estimation.whitening import gram_of, spectra_of, Weights, weights_of
-from stewart_dynamics.identification.causes import Cause, Causes, SAME
 from stewart_dynamics.identification.extraction import BAND, Extract, Extracts, SAMPLES
+from stewart_dynamics.identification.lack_of_fit_causes import Cause, Causes, SAME
 from stewart_dynamics.identification.parameter_fit import (
     directions, Fit, least_deviation, Noisy, residual_of)
 from stewart_dynamics.identification.unknowns import ORIGINS, Unknowns

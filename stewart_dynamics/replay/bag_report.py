@@ -37,13 +37,13 @@ from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 from stewart_dynamics.replay.bag_summary import BagSummary, LegLoads, margin_key, Rejected
 from stewart_dynamics.replay.motor_charts import motor_charts, OperatingPoints
 from stewart_dynamics.replay.motor_loads import NEEDS
+from stewart_dynamics.replay.report_plots import (
+    base_wrench_plots, measured_plots, motion_plots, plotted, spectrum_plots, uncertain_plots)
 from stewart_dynamics.replay.statements import cards, FIRST, values_of
 from stewart_dynamics.replay.summary import Answered
 from stewart_dynamics.reporting.curves import Curves, Frames
 from stewart_dynamics.reporting.pages import (
     base64_of, decimals_of, link, link_to_other, page, plotly_script)
-from stewart_dynamics.reporting.plots import (
-    base_wrench_plots, measured_plots, motion_plots, plotted, spectrum_plots, uncertain_plots)
 from stewart_dynamics.reporting.results_folder import DATASHEET, DATASHEET_PAGE, DATASHEETS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.response.recorded_response import Followed

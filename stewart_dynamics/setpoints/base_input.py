@@ -14,7 +14,7 @@ from stewart_dynamics.mechanics.rows import BASE, GRAVITY
 from stewart_dynamics.parameters.table import MOVING, Parameters
 from stewart_dynamics.setpoints.arrival_stamps import ArrivalStamps
 from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, MessageError
-from stewart_dynamics.setpoints.inconsistency import QUANTITIES, RATES
+from stewart_dynamics.setpoints.inconsistency_causes import QUANTITIES, RATES
 from stewart_dynamics.setpoints.input_messages import BASE_ACCEL, BASE_TWIST
 from stewart_dynamics.setpoints.input_stream import Clock, InputStream, Joined
 from stewart_dynamics.setpoints.measured_gravity import MeasuredGravity

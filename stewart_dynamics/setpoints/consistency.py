@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics.frames.rotation import (
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY,
     POSITION, ROTATION, TWIST)
-from stewart_dynamics.setpoints.inconsistency import (
+from stewart_dynamics.setpoints.inconsistency_causes import (
     ACCELERATION, Inconsistency, POSES, QUANTITIES, RATES, reason_of, SPIN, SPIN_RATE, Sums,
     TWIST_OF, TWISTS, TWISTS_GIVEN, VELOCITY)
 

@@ -23,7 +23,7 @@ from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters, POSES_ALONE
 from stewart_dynamics.setpoints.base_input import BaseInput
 from stewart_dynamics.setpoints.consistency import Consistency, inconsistencies, MessageError
-from stewart_dynamics.setpoints.inconsistency import QUANTITIES, RATES
+from stewart_dynamics.setpoints.inconsistency_causes import QUANTITIES, RATES
 from stewart_dynamics.setpoints.input_messages import ACCEL, COMBINED, SOURCES, TWIST
 from stewart_dynamics.setpoints.input_stream import Clock, InputStream, Joined
 from stewart_dynamics.setpoints.output_messages import OutputMessages
