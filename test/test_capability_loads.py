@@ -127,18 +127,18 @@ def loads(*arguments: Any) -> Use:
     return {name: each for name, each in use(*arguments).items() if name not in RATES}
 
 
-def check(found: Extent, use: Callable[[float], Use], tolerance: float = 1e-9) -> None:
+def check(found: Extent, used: Callable[[float], Use], tolerance: float = 1e-9) -> None:
     """Check that an answer is where the limit that is named is reached, and none before."""
     if found.value == 0.0:
-        assert max(each.max() for each in use(0.0).values()) > 1.0 - tolerance
+        assert max(each.max() for each in used(0.0).values()) > 1.0 - tolerance
         return
-    at = use(found.value)
+    at = used(found.value)
     limit = at['torque_max' if found.limit in AVAILABLE else found.limit].reshape(-1, 6)
     assert max(each.max() for each in at.values()) == pytest.approx(1.0, abs=tolerance)
     assert limit[found.sample or 0, found.leg] == pytest.approx(1.0, abs=tolerance)
-    assert max(each.max() for each in use(found.value * (1.0 + 1e-6)).values()) > 1.0
+    assert max(each.max() for each in used(found.value * (1.0 + 1e-6)).values()) > 1.0
     for part in np.linspace(0.0, 1.0, 21):
-        assert max(each.max() for each in use(part * found.value).values()) <= 1.0 + tolerance
+        assert max(each.max() for each in used(part * found.value).values()) <= 1.0 + tolerance
 
 
 def changed(motion: Motion, part: slice, change: Array) -> Motion:
@@ -254,7 +254,7 @@ def test_what_is_held_without_end_ends_at_the_continuous_torque(kind: str, seed:
     for direction in rng(seed).normal(size=(5, 6)):
         found = Capability(platform).wrench(rest, direction, continuous=True)
         assert found.limit == 'torque_continuous'
-        # the torque that is published and heats the winding: at rest without losses
+        # The torque that heats the winding at rest is the one without losses.
         check(found._replace(limit='held'), lambda k, way=direction: {'held': np.abs(
             platform.motors(rest, -k * way).torques) / continuous})
 

@@ -12,6 +12,7 @@ import pytest
 from snapshot import Snapshot
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.file_process import FileProcess
 from stewart_dynamics.replay.output_files import OutputFiles
 from stewart_dynamics.replay.replay_options import Options
 from test_legs_table import motions_of
@@ -46,6 +47,28 @@ def test_the_processes_write_the_same_files(tmp_path: Path) -> None:
     rows = (tmp_path / 'False' / 'legs.csv').read_bytes()
     assert rows.count(b'\n') == 6 * BLOCK + 1
     assert b',,' in rows  # forces or base wrenches that are not known
+
+
+class Broken:
+    """A file whose writing fails in the way in which the blocks of a killed replay end."""
+
+    def write(self, block: object) -> None:
+        raise EOFError('in the file')
+
+    def close(self) -> None:
+        """Nothing is left to do."""
+
+
+def open_broken(folder: Path) -> Broken:
+    return Broken()
+
+
+def test_an_end_of_file_in_the_file_is_not_the_end_of_the_replay(tmp_path: Path) -> None:
+    file = FileProcess(open_broken, tmp_path)
+    with pytest.raises(StewartError, match='EOFError: in the file'):
+        file.write(None)
+        file.close()
+    file.abandon()
 
 
 def test_errors_of_the_process_are_raised_here(tmp_path: Path, snapshot: Snapshot) -> None:

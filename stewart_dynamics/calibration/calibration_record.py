@@ -52,7 +52,7 @@ class Frame(Record):
     """A frame in another one."""
 
     position_m: Annotated[list[float], means('its origin')]
-    quaternion: Annotated[list[float], means('its rotation')]
+    quaternion: Annotated[list[float], means('its rotation, x y z w')]
 
 
 class FramesOfDevice(Record):

@@ -179,7 +179,7 @@ class PossibleChange(Record):
     """A change with which a motion is possible."""
 
     change: Annotated[str, means('`amplitude`, `speed` or `height`')]
-    value: Annotated[float, means('a part, or metres away from the base')]
+    value: Annotated[float, means('a part, or meters away from the base')]
     words: Annotated[str, means('in words: from 93 mm higher')]
 
 

@@ -145,13 +145,14 @@ class Hexapod:
         """
         Return base, bodies of each leg from the base on, and platform, as a format has them.
 
-        base: its name where it is not ``base_body``.
-        solid: give bodies of legs mass and inertia about all axes.
-        uris: take meshes that are no paths, too.
-        from_home: the format counts positions from home; from where parameters count them, if that
-            is no parameter.
-        paired: a joint with one limit has both.
-        unlimited: effort and rate where the format requires limits of each joint.
+        base: the base's name, by default ``base_body``.
+        solid: whether bodies of legs get mass and inertia about all axes, as simulators require.
+        uris: whether meshes may be URIs, such as package://, and not only paths.
+        from_home: whether the format counts the positions of drives from home. Kinds of legs whose
+            zero is not a parameter are then counted from the zero of their parameters.
+        paired: whether a joint with one limit of position gets the other one as well.
+        unlimited: the limit of rate [m/s, rad/s] and effort [N, N m] of a drive that has none,
+            where the format requires one; None: it requires none.
         """
         base = base or self.base_body
         p, size = self.parameters.geometry, mean_radius(self.parameters.geometry.platform_joints)

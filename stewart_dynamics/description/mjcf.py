@@ -10,7 +10,7 @@ leg; ``ctrl`` is the force of each leg in the order of ``joints`` [N]. The world
 axes, in which gravity is given: a base that is tilted has a tilted gravity.
 
 Constraints are soft in MuJoCo: at a platform joint they act as springs, and leave gaps of
-micrometres in motion. Coulomb friction is such a constraint, too.
+micrometers in motion. Coulomb friction is such a constraint, too.
 """
 
 from __future__ import annotations

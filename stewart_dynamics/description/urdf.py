@@ -8,8 +8,7 @@ A hexapod as URDF: a tree whose loops are open at the platform joints.
 Its joints, their order and their positions at a pose are those of
 ``mechanics.kinematics.leg_joints``. The frame ``<leg>_platform_joint`` on the platform is where
 the origin of ``<leg>_piston`` is while the loops are closed. Parameters that URDF has no element
-for stand in a block ``stewart_dynamics``, which other
-readers ignore.
+for stand in a block ``stewart_dynamics``, which other readers ignore.
 """
 
 from __future__ import annotations

@@ -122,11 +122,11 @@ def usd(hexapod: Hexapod, name: str) -> str:
         if part.leg and made.child == part.leg.last:
             writer.close_loop(part.leg, part.body, platform.body, part.leg is not hexapod.legs[0])
     zero = [hexapod.kind.zero] if hexapod.kind.zero else []
-    for name, parameter in carried(hexapod, tree, _elements(hexapod, tree), zero):
+    for each, parameter in carried(hexapod, tree, _elements(hexapod, tree), zero):
         for prefix, value in ((VALUE, parameter.value), (ELEMENT, parameter.element)):
             if value:
                 root.GetPrim().CreateAttribute(
-                    attribute_name(prefix, name), Sdf.ValueTypeNames.String).Set(value)
+                    attribute_name(prefix, each), Sdf.ValueTypeNames.String).Set(value)
     text: str = stage.GetRootLayer().ExportToString()
     return text
 

@@ -10,7 +10,7 @@ need, and is positive where the error is likely, as a value above all that are k
 the evidence for each leg; the leg with the largest one is named. Numbers that are not known are
 nan, which is no evidence.
 
-Rooms declare their hypotheses in tables, nested tuples in the order of the report. ``First``
+Packages declare their hypotheses in tables, nested tuples in the order of the report. ``First``
 reports the first entry that finds anything, where later ones would follow from it; ``When``
 depends on a condition; a function finds the errors of another subject. A new possible error is
 one entry of a table.

@@ -17,7 +17,7 @@ from contextlib import suppress
 import pickle
 import subprocess
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any, BinaryIO, TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.program import unexpected
@@ -96,15 +96,21 @@ def main() -> None:
     """Write the blocks of the standard input; an error goes to the standard output."""
     blocks, error = sys.stdin.buffer, sys.stdout.buffer
     try:
-        open_file, arguments = pickle.load(blocks)
+        open_file, arguments = _received(blocks)
         file = open_file(*arguments)
-        while (call := pickle.load(blocks)) is not None:
+        while (call := _received(blocks)) is not None:
             method, block = call
             getattr(file, method)(block)
         file.close()
-    except (EOFError, pickle.UnpicklingError):
-        pass  # the replay was killed
     except (StewartError, OSError) as exc:
         pickle.dump(exc, error)
     except Exception as exc:
         pickle.dump(StewartError(unexpected(exc)), error)
+
+
+def _received(blocks: BinaryIO) -> Any:
+    """Return what the replay sends; end the process where the replay was killed."""
+    try:
+        return pickle.load(blocks)
+    except (EOFError, pickle.UnpicklingError):
+        sys.exit(1)

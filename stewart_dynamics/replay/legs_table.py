@@ -113,7 +113,7 @@ class Table(ABC):
         """Complete the file."""
 
     def abandon(self) -> None:
-        """Close the file without completing it."""
+        """Close the file, which need not be complete."""
         self.close()
 
 

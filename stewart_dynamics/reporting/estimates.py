@@ -159,9 +159,10 @@ def estimate(name: str, unit: str, start: float, value: float, state: str, error
     name, unit, state: name, unit and state of the parameter.
     start, value: the file's value and the estimate.
     error, share: standard error; share of the unknown directions.
-    at_bound, sure: whether the value is at a bound; whether it has an interval, if it is
-        identified.
-    prior: whether the interval holds without that, because the file's uncertainty is in it.
+    at_bound: whether the value is at a bound.
+    sure: whether there are intervals at all; without ``prior`` only of identified parameters.
+    prior: whether the error includes the file's uncertainty, so that parameters that are not
+        identified have an error and an interval, too.
     more: keys that not all estimates have.
     """
     return Estimate(

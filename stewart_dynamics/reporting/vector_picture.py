@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.colors import custom_properties
+from stewart_dynamics.colors import custom_properties, ROLES
 
 
 class Picture:
@@ -72,8 +72,8 @@ class Picture:
         head, body = self.svg().removesuffix('</svg>').split('>', 1)
         return '\n'.join([
             f'{head} xmlns="http://www.w3.org/2000/svg">', f'<style>\n{custom_properties()}{style}'
-            '</style>', '<rect width="100%" height="100%" fill="#ffffff"/>', body, *groups,
-            '</svg>', ''])
+            '</style>', f'<rect width="100%" height="100%" fill="{ROLES["paper"]}"/>', body,
+            *groups, '</svg>', ''])
 
 
 class Chart:
