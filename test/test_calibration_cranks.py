@@ -290,7 +290,8 @@ def test_equal_poses_and_angles_of_any_scale_have_no_other_unit() -> None:
     built = tooth({1: 14.4})
     angles, poses = built.measure(seeded(6), 1, 0.0)
     ten = np.zeros(10, dtype=int)
-    found = calibrate(built.platform, angles[ten], poses[ten], unknowns=['zero'])
+    found = calibrate(built.platform, angles[ten], poses[ten], unknowns=['zero'],
+                      accept_mistakes=True)  # they are copies
     assert_allclose(found.values, built.values(), atol=1e-9)
     angles, poses = built.measure(seeded(6), 60)
     with pytest.raises(StewartError) as caught:

@@ -247,7 +247,7 @@ def test_the_motor_needed_is_that_of_all_bags_but_those_near_a_singularity(tmp_p
     assert largest.torque_peak_n_m == pytest.approx(MARGIN * max(
         abs(row['torque_peak_n_m']) for row in rows[:2]))
     page = (tmp_path / 'index.html').read_text(encoding='utf-8')
-    assert f'"motor":"{largest.torque_continuous_n_m:.4g} N m continuous, ' in page
+    assert f'{largest.torque_continuous_n_m:.4g} N m continuous, ' in page
     with (tmp_path / 'fleet.csv').open(encoding='utf-8', newline='') as file:
         cells = next(csv.DictReader(file))
     assert float(cells['bus_power_peak_w']) == rows[0]['bus_power_peak_w']
