@@ -312,7 +312,7 @@ class Mistake(Record):
     """A possible error in the messages."""
 
     topic: Annotated[str, means('topic of the node')]
-    text: Annotated[str, means('the mistake, with its size and likely cause')]
+    text: Annotated[str, means('the contradiction, with its size and likely cause')]
     first_at_s: Annotated[Number, means('when it begins; null if stamps jumped back')]
 
 
@@ -392,7 +392,7 @@ class Measured(Record):
         'the same by the RMS of the measured forces of all legs')]
     legs: dict[str, MeasuredLeg]
     external_wrench_given: Annotated[bool, means(
-        'false where such a mistake, other than `scale`, makes the external wrench meaningless: '
+        'false where such an error, other than `scale`, makes the external wrench meaningless: '
         'its values are null, and no contacts are listed')]
     likely_mistake: Annotated[EffortsMistake | None, means('the possible error in the efforts')]
     external_wrench: ExternalWrench
