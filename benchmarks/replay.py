@@ -111,7 +111,7 @@ ENDING = """
 import resource
 with open('/proc/self/status') as status:
     peak = next(int(line.split()[1]) for line in status if line.startswith('VmHWM'))
-peak += resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss  # the process that writes
+peak += resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss  # the larger process that writes
 print(f'\\n{many} {peak}')
 """
 

@@ -89,6 +89,17 @@ def test_files_and_page(table: Path, tmp_path: Path, snapshot: Snapshot) -> None
     assert (output / 'report.html').read_text().count('<td class="none">fixed</td>') == 6
 
 
+@pytest.mark.parametrize('copies', [0, 1, 20])
+def test_measurements_that_repeat_earlier_ones_are_named(
+        copies: int, table: Path, tmp_path: Path) -> None:
+    head, *rows = table.read_text().splitlines()
+    path = tmp_path / 'poses.csv'
+    path.write_text('\n'.join([head, *rows, *rows[:copies]]))
+    done = call(main, path, '--params', PLATFORM, '--output', tmp_path / 'out')
+    named = f'{copies} of {len(rows) + copies} measurements repeat an earlier one, number for'
+    assert (named in done.out) is (copies > 1)
+
+
 def tracked(path: Path, poses: Pose, home: bool, noise: float = 1e-6) -> Path:
     """Write the file of a tracker that sees each pose for a second, with moves between them."""
     rng = np.random.default_rng(3)

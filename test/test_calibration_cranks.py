@@ -290,13 +290,21 @@ def test_equal_poses_and_angles_of_any_scale_have_no_other_unit() -> None:
     built = tooth({1: 14.4})
     angles, poses = built.measure(seeded(6), 1, 0.0)
     ten = np.zeros(10, dtype=int)
-    found = calibrate(built.platform, angles[ten], poses[ten], unknowns=['zero'],
-                      accept_mistakes=True)  # they are copies
+    found = calibrate(built.platform, angles[ten], poses[ten], unknowns=['zero'])
     assert_allclose(found.values, built.values(), atol=1e-9)
     angles, poses = built.measure(seeded(6), 60)
     with pytest.raises(StewartError) as caught:
         calibrate(built.platform, 1500.0 + 640.0 * angles, poses, unknowns=['zero'])
     assert '; or ' not in str(caught.value)
+
+
+def test_zeros_by_which_no_pose_has_the_angles_are_calibrated() -> None:
+    built = Built(RIG).deviate(seeded(5), ('zero', 'lengths'))
+    angles, poses = built.measure(seeded(6), 60)
+    found = calibrate(built.platform, angles + np.pi, poses, unknowns=['zero', 'lengths'])
+    assert found.validation is not None and not found.validation.before.known
+    assert found.validation.after.rms[0] < 2e-3
+    assert found.after.max() < 2e-3
 
 
 def test_too_few_poses_and_wrong_names_are_rejected(snapshot: Snapshot) -> None:

@@ -7,6 +7,7 @@
 from contextlib import suppress
 import cProfile
 import itertools
+import math
 import os
 import pstats
 import re
@@ -234,7 +235,7 @@ def test_limits_that_are_inf_are_unlimited(kind, pattern, tmp_path):
 def quaternion_of(angles):
     """Return a quaternion, which needs no length 1, of the text of three angles."""
     turn = to_quaternion(from_euler([float(each) for each in angles.split()]))
-    return ' '.join(repr(float(each)) for each in 3.0 * turn)
+    return ' '.join(repr(float(each)) for each in 3e200 * turn)
 
 
 def with_quaternions(text):
@@ -247,6 +248,16 @@ def with_quaternions(text):
         x, y, z, angles = pose.text.split(maxsplit=3)
         pose.set('rotation_format', 'quat_xyzw')
         pose.text = ' '.join([x, y, z, quaternion_of(angles)])
+    return ET.tostring(root, encoding='unicode')
+
+
+def in_degrees(text):
+    """Return an SDFormat whose angles are in degrees, said as libsdformat takes it, too."""
+    root = ET.fromstring(text)
+    for pose in root.iter('pose'):
+        x, y, z, *angles = pose.text.split()
+        pose.set('degrees', 'True')
+        pose.text = ' '.join([x, y, z, *(repr(math.degrees(float(each))) for each in angles)])
     return ET.tostring(root, encoding='unicode')
 
 
@@ -263,9 +274,10 @@ def with_frames(text):
 
 
 @pytest.mark.parametrize(('kind', 'change'), [
-    ('urdf', with_quaternions), ('sdf', with_quaternions), ('sdf', with_frames)])
+    ('urdf', with_quaternions), ('sdf', with_quaternions), ('sdf', with_frames),
+    ('sdf', in_degrees)])
 @pytest.mark.parametrize('p', [PLATFORM, CRANKS], ids=['telescopic', 'crank'])
-def test_quaternions_and_frames_at_joints_change_nothing(p, kind, change, tmp_path):
+def test_quaternions_degrees_and_frames_at_joints_change_nothing(p, kind, change, tmp_path):
     """As in URDF 1.1, and in SDFormat 1.9 and 1.8; libsdformat's own files read the same."""
     (tmp_path / 'own').mkdir()
     own = read_hexapod(written(p, kind, tmp_path / 'own'))

@@ -389,6 +389,17 @@ def test_results_are_columns_of_a_table(shape: tuple[int, ...]) -> None:
         assert np.array_equal(table[name].reshape(shape), getattr(result, name))
 
 
+def test_results_of_cranks_are_drawn() -> None:
+    platform = StewartPlatform.from_yaml(ROOT / 'config' / 'crank_platform.yaml')
+    home = platform.home_pose()
+    result = platform.inverse_dynamics(Motion(home.position + 1e-3 * np.eye(3), home.rotation))
+    figure = result.plot()
+    assert [each.title.text for each in figure.select_yaxes()] == [
+        'angle [rad]', 'speed [rad/s]', 'torque [N m]']
+    lines = [*figure.select_traces({'yaxis': 'y3'})]
+    assert np.array_equal(np.stack([line.y for line in lines], axis=-1), result.torques)
+
+
 def test_results_are_drawn(snapshot: Snapshot) -> None:
     position = np.array([[0.0, 0.0, 1.1], [0.0, 0.0, 1.12], [0.0, 0.0, 1.15]])
     result = ON_EXAMPLE.inverse_dynamics(Motion(position, np.eye(3)))

@@ -102,7 +102,7 @@ class Calibration(NamedTuple):
     validation: Validation | None
     lack_of_fit: tuple[PossibleError, ...]
     likely: tuple[PossibleError, ...]
-    """Mistakes that were accepted."""
+    """Possible errors that were accepted."""
     assembly: tuple[PossibleError, ...]
     """Errors of the assembly that calibrated zeros show, which are in the values."""
     legs: CalibratedLegs
@@ -219,14 +219,19 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     missing = not_identified(used, what.shares, LARGEST_SHARE, size)
     before, after = (np.sqrt(np.mean(each ** 2, axis=0)) for each in (
         used.at(_with_frames(used, free, of_file)).residuals, found.lin.residuals))
-    if IDENTIFIED not in states:
+    if IDENTIFIED not in states and not held.all():  # of frames alone there is none
         refuse([PossibleError(
             'identifiable', 'no number is identifiable by itself, with residuals of '
             f'{1e3 * after.max():.3g} mm: {lack[0].text if lack else missing}')])
     validation = _validated(used, free, of_file, found, hold_out)
     if validation is not None:
+        if not validation.after.known:
+            raise StewartError('by a fit to the other poses, the hexapod has no pose with the '
+                               f'{p.leg_kind.position.field} of any held-out one')
+        # by the file there is none where zeros of the drives are far off: it is worse
         errors_before, errors_after = (
-            math.hypot(each.rms[0], size * each.rms[1]) for each in validation)
+            math.hypot(each.rms[0], size * each.rms[1]) if each.known else math.inf
+            for each in validation)
         if not errors_after < _WORSE * errors_before:
             refuse([PossibleError(
                 'worse', f'held-out poses are {_shown(validation.before)} off by the file, but '

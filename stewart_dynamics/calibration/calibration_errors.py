@@ -32,7 +32,7 @@ from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.kinematics.home_pose import determinant_at_home
 from stewart_dynamics.parameters.table import AUTO, Parameters
 from stewart_dynamics.possible_errors.hypothesis import (
-    find_errors, Hypothesis, likeliest, PossibleError, Table)
+    Hypothesis, likeliest, PossibleError, Table)
 from stewart_dynamics.possible_errors.transforms import swapped_pairs
 
 # An error is likely if the misfit without it is smaller than this part.
@@ -49,8 +49,6 @@ _ALIKE, _EXACT = 2.0, 1e-3
 # Largest scale of positions that is tried and how near, logarithms; a misfit above all others.
 _LARGEST_SCALE, _SCALE_STEP, _WORST = math.log(2.0), 1e-3, 1e3
 DEVICE_SCALE, LEG_SCALE = 'device', 'scale'
-# Standard errors are 5 % too small with this share of copies.
-_COPIES = 0.1
 # Fewer poses say nothing about errors that change the positions of a leg alike.
 _FEWEST = 4
 # A joint that moves by a larger part of the characteristic length is not of this hexapod.
@@ -81,31 +79,8 @@ class Measured(NamedTuple):
         whole = max(map(_spread, motions))
         return _spread(off) / whole if whole > 0.0 else math.inf
 
-    @property
-    def number(self) -> int:
-        """Return the number of measurements."""
-        return len(self.equations.positions)
-
-    @property
-    def repeated(self) -> int:
-        """Return the number of measurements that repeat an earlier one, number for number."""
-        pose = self.equations.pose
-        return self.number - len(np.unique(np.column_stack([
-            self.equations.positions, pose.position, pose.rotation.reshape(-1, 9)]), axis=0))
-
-
-_REPEATED: Table[Measured] = Hypothesis('repeated', lambda m: m.repeated - _COPIES * m.number, (
-    '{repeated} of {number} measurements repeat an earlier one, number for number: copies are not '
-    'independent, and standard errors come out too small: remove them'))
-
 
 def find_input_errors(measured: Measured) -> Iterator[PossibleError]:
-    """Yield the likeliest error in positions, poses or their angles, if one is likely; copies."""
-    yield from _likeliest_transform(measured)
-    yield from find_errors(_REPEATED, measured)
-
-
-def _likeliest_transform(measured: Measured) -> Iterator[PossibleError]:
     """Yield the likeliest error in positions, poses or their angles, if one is likely."""
     equations = measured.equations
     if len(equations.positions) < _FEWEST or not _moved(equations):

@@ -96,7 +96,8 @@ class Validation(Record):
     """Errors on poses that were held out."""
 
     poses: Annotated[int, means('number of held-out poses')]
-    before: Annotated[ErrorsOfPoses, means('errors by the file')]
+    before: Annotated[ErrorsOfPoses | None, means(
+        'errors by the file; null: by it, no pose has the leg positions')]
     after: Annotated[ErrorsOfPoses, means('errors by a fit to the others')]
 
 

@@ -37,7 +37,8 @@ def document(found: Calibration, measured: Measured, source: str, options: Optio
     return of_kind(CalibrationResult, kind)(
         date=now(),
         poses=MeasuredPoses(
-            source, legs, pose, len(measured.names), found.poses, list(measured.notices)),
+            source, legs, pose, len(measured.names), found.poses,
+            [*measured.notices, *measured.notices_of_repeats]),
         options=options,
         parameters=[
             estimate(name, unit, start, value, state, error, share, False,
@@ -60,8 +61,9 @@ def document(found: Calibration, measured: Measured, source: str, options: Optio
                 joints, found.before, found.after, strict=True)}),
         outliers=[Outlier(measured.names[each.pose], [joints[n] for n in each.legs],
                           each.residual) for each in found.outliers],
-        validation=None if found.validation is None else Validation(
-            len(found.validation.after.position), *map(_errors, found.validation)),
+        validation=None if not (held := found.validation) else Validation(
+            len(held.after.position), _errors(held.before) if held.before.known else None,
+            _errors(held.after)),
         lack_of_fit=None if not lack else FoundLackOfFit(
             lack[0].what, '; '.join(each.text for each in lack), 'none',
             [Cause(*each) for each in lack]),
@@ -90,6 +92,7 @@ def validation_text(held: Validation | None) -> str:
     if held is None:
         return 'not validated: too few poses to hold some out'
     before, after = (
+        'no pose has the leg positions' if errors is None else
         f'{1e3 * errors.position_rms_m:.3g} mm and {1e3 * errors.rotation_rms_rad:.3g} mrad'
         for errors in (held.before, held.after))
     return (f'pose errors on {plural(held.poses, "held-out pose")}, RMS: {before} by the file, '

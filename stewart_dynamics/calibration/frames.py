@@ -37,6 +37,11 @@ class PoseErrors(NamedTuple):
     rotation: Array  # (N,) [rad]
 
     @property
+    def known(self) -> bool:
+        """Return whether a pose has the leg positions, in one case at least."""
+        return bool(np.isfinite(self.position).any())
+
+    @property
     def rms(self) -> tuple[float, float]:
         """Return both as root mean squares."""
         return tuple(float(np.sqrt(np.nanmean(each ** 2))) for each in self)  # type: ignore

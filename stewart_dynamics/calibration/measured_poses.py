@@ -24,6 +24,8 @@ from stewart_dynamics.tables.reading import Reading
 
 _MOST = 20_000  # poses of a file
 _METER, _MILLIMETER = 'm', 1e-3
+# Standard errors are 5 % too small with this share of copies.
+_COPIES = 0.1
 DEGREE = np.pi / 180.0
 
 
@@ -37,6 +39,17 @@ class MeasuredPoses(NamedTuple):
     """(N, 3) angles as they were read, if the poses were given by angles without a unit."""
     topics: tuple[str, str] | None = None  # of the legs and of the poses, if they are from a bag
     notices: tuple[str, ...] = ()
+
+    @property
+    def notices_of_repeats(self) -> list[str]:
+        """Return the notice that many measurements repeat an earlier one, if they do."""
+        rows = np.hstack([self.positions, self.poses.position, self.poses.quaternion])
+        repeated = len(rows) - len(np.unique(rows, axis=0))
+        if repeated <= _COPIES * len(rows):
+            return []
+        return [f'{repeated} of {len(rows)} measurements repeat an earlier one, number for '
+                'number: as copies, or within the resolution of the device, they are not '
+                'independent, and standard errors come out too small']
 
 
 class Millimeters(NamedTuple):

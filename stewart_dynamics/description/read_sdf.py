@@ -13,7 +13,7 @@ import numpy as np
 
 from stewart_dynamics.description.carried import CARRIED
 from stewart_dynamics.description.sdf import DRAKE, POSITION
-from stewart_dynamics.description.xml_model import carried_of, Defaults, XmlModel
+from stewart_dynamics.description.xml_model import carried_of, Defaults, switch, XmlModel
 from stewart_dynamics.legs.mechanism import (
     DescriptionError, FIXED, HERE, Joint, Mechanism, MechanismBody, Placement, WORLD)
 
@@ -24,7 +24,6 @@ _MODEL = '__model__'
 _DETACHABLE = '::systems::DetachableJoint'
 # Before this version axes are in the frame of the model, not of the joint.
 _JOINT_AXES = (1, 5)
-_ON, _OFF = ('1', 'true'), ('0', 'false')
 # In the names of systems that exert forces on links.
 _FORCES = 'buoyancy', 'hydrodynamics', 'liftdrag', 'spring', 'wind', 'thruster', 'applylinkwrench'
 
@@ -97,13 +96,13 @@ class _SdfModel(XmlModel):
     def body(self, link: ET.Element) -> MechanismBody:
         """Return a link as a body, with the forces on it that have no parameter."""
         made, inertial = super().body(link), link.find('inertial')
-        if inertial is not None and inertial.get('auto') in _ON:
+        if inertial is not None and switch(inertial.get('auto')):
             made.mass = self.number(inertial, made.name, None, 'mass')
             made.inertia = np.zeros((3, 3))
             made.note = f'{made.name}: inertial auto: engines compute ' + (
                 'mass and inertia from its shapes: not read' if made.mass is None
                 else 'its inertia from its shapes: 0 kg m^2 here')
-        if link.findtext('gravity', '').strip() in _OFF:
+        if switch(link.findtext('gravity')) is False:
             made.weightless = 'gravity switched off'
         if link.find('velocity_decay') is not None:
             made.left_out.append('velocity_decay')
@@ -116,14 +115,13 @@ class _SdfModel(XmlModel):
         name = joint.get('name', '')
         made = self.joint(joint, self.place(name), self.number(joint, name, 0.0, POSITION))
         gear = self.number(joint, name, 1.0, f'{_DRAKE}gear_ratio')
-        made.armature = gear ** 2 * self.number(joint, name, 0.0, f'{_DRAKE}rotor_inertia')
+        made.armature = gear * gear * self.number(joint, name, 0.0, f'{_DRAKE}rotor_inertia')
         return made
 
     def axis_frame(self, axis: ET.Element, at: Placement) -> Placement:
         """Return the frame of an axis, by the rule of the version."""
         xyz = axis.find('xyz')
-        if self._axes_in_model or axis.findtext(
-                'use_parent_model_frame', '').strip() in _ON:
+        if self._axes_in_model or switch(axis.findtext('use_parent_model_frame')):
             return self.place(_MODEL)
         frame = None if xyz is None else xyz.get('expressed_in')
         return self.place(frame) if frame else at

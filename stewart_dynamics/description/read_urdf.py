@@ -25,11 +25,10 @@ from stewart_dynamics.description.carried import CARRIED
 from stewart_dynamics.description.loops import loops_beside
 from stewart_dynamics.description.read_sdf import SDFORMAT
 from stewart_dynamics.description.xml_model import (
-    carried_of, Defaults, kind_of, XmlModel)
+    carried_of, Defaults, kind_of, switch, XmlModel)
 from stewart_dynamics.legs.mechanism import HERE, Joint, Mechanism
 
 _CLOSING = re.compile('(closing_.+_)1')
-_TRUE, _FALSE = ('1', 'true'), ('0', 'false')
 _ORIGIN = np.zeros(3)
 
 
@@ -123,8 +122,8 @@ class UrdfModel(XmlModel):
                 joints[name].spring(stiffness, reference)
             if name in mechanism.parts:
                 part = mechanism.parts[name]
-                if (block.findtext('gravity', '').strip() in _FALSE
-                        or block.findtext('turnGravityOff', '').strip() in _TRUE):
+                if (switch(block.findtext('gravity')) is False
+                        or switch(block.findtext('turnGravityOff'))):
                     part.weightless = 'gravity switched off'
                 if decay:
                     part.left_out.append(f'dampingFactor {decay:.4g}')

@@ -118,13 +118,13 @@ class XmlModel:
             if turn is not None and given.get('rpy') is not None:
                 raise self.error(f'{what}: must have rpy or {_QUATERNION}, not both')
             return self._placement(self.numbers(given.get('xyz'), 3, what), self.numbers(
-                turn or given.get('rpy'), 3 if turn is None else 4, what), what)
+                given.get('rpy') if turn is None else turn, 3 if turn is None else 4, what), what)
         given = element.find('pose')
         if given is None or not (given.text or '').strip():
             return HERE
         what, quaternion = f'pose of {what}', given.get('rotation_format') == _QUATERNION
         values = self.numbers(given.text, 7 if quaternion else 6, what)
-        in_degrees = not quaternion and given.get('degrees') in ('1', 'true')
+        in_degrees = not quaternion and switch(given.get('degrees')) is True
         return self._placement(
             values[:3], values[3:] * (np.pi / 180.0 if in_degrees else 1.0), what)
 
@@ -132,10 +132,12 @@ class XmlModel:
         """Return a placement turned by three angles [rad], or by a quaternion x y z w."""
         if len(turn) == 3:
             return Placement(from_euler(turn), at)
-        size = float(np.linalg.norm(turn))
-        if size == 0.0:
+        largest = float(np.abs(turn).max())
+        if largest == 0.0:
             raise self.error(f'{what}: the quaternion is zero')
-        return Placement(np.reshape(from_quaternion(*turn / size), (3, 3)), at)
+        turn = turn / largest  # squares of its numbers are then in range
+        return Placement(np.reshape(
+            from_quaternion(*turn / np.linalg.norm(turn)), (3, 3)), at)
 
     def link(self, name: str, what: str) -> str:
         """
@@ -247,6 +249,11 @@ class XmlModel:
 def kind_of(joint: ET.Element) -> str:
     """Return the kind of a joint."""
     return _KINDS.get(joint.get('type', ''), OTHER)
+
+
+def switch(text: str | None) -> bool | None:
+    """Return whether a value is true or false, in any case as libsdformat reads it."""
+    return {'1': True, 'true': True, '0': False, 'false': False}.get((text or '').strip().lower())
 
 
 def carried_of(elements: Iterable[ET.Element]) -> dict[str, CarriedParameter]:

@@ -42,7 +42,7 @@ class FileProcess:
         self._folder = arguments[0]
         # A session of its own: Ctrl-C ends the replay, which ends the process.
         self._process = subprocess.Popen(
-            [sys.executable, '-I', '-c', _PROGRAM, *sys.path], stdin=subprocess.PIPE,
+            [sys.executable, '-c', _PROGRAM, *sys.path], stdin=subprocess.PIPE,
             stdout=subprocess.PIPE, start_new_session=True)
         assert self._process.stdin is not None and self._process.stdout is not None
         self._blocks, self._error = self._process.stdin, self._process.stdout
@@ -94,7 +94,14 @@ class FileProcess:
 
 def main() -> None:
     """Write the blocks of the standard input; an error goes to the standard output."""
-    blocks, error = sys.stdin.buffer, sys.stdout.buffer
+    error = _error_of(sys.stdin.buffer)
+    with suppress(BrokenPipeError), sys.stdout.buffer as end:  # the replay may have ended
+        if error is not None:
+            pickle.dump(error, end)
+
+
+def _error_of(blocks: BinaryIO) -> Exception | None:
+    """Write the blocks; return the error that ended it, if any."""
     try:
         open_file, arguments = _received(blocks)
         file = open_file(*arguments)
@@ -103,9 +110,10 @@ def main() -> None:
             getattr(file, method)(block)
         file.close()
     except (StewartError, OSError) as exc:
-        pickle.dump(exc, error)
+        return exc
     except Exception as exc:
-        pickle.dump(StewartError(unexpected(exc)), error)
+        return StewartError(unexpected(exc))
+    return None
 
 
 def _received(blocks: BinaryIO) -> Any:

@@ -45,7 +45,11 @@ class OutputFiles:
         bag = folder, parameters, options, inputs
         self._table = FileProcess(table, folder, self._rows.names) if processes else table(
             folder, self._rows.names)
-        self._bag = FileProcess(open_bag, *bag) if processes else open_bag(*bag)
+        try:
+            self._bag = FileProcess(open_bag, *bag) if processes else open_bag(*bag)
+        except BaseException:  # Ctrl-C as well
+            self._table.abandon()
+            raise
 
     def write(self, block: Answered) -> None:
         """Write setpoints."""

@@ -136,7 +136,7 @@ class InverseDynamics:
 
     def plot(self, times: ArrayLike | None = None, joints: Sequence[str] = LEGS) -> Figure:
         """
-        Return a plotly figure of lengths, rates and forces.
+        Return a plotly figure of lengths, rates and forces; of cranks angles, speeds and torques.
 
         Parameters
         ----------
@@ -152,8 +152,10 @@ class InverseDynamics:
 
         """
         from stewart_dynamics.reporting.result_figures import figure_of_legs
-        return figure_of_legs({'length [m]': self.lengths, 'rate [m/s]': self.rates,
-                               'force [N]': self.forces}, times, joints)
+        curves = {'angle [rad]': self.angles, 'speed [rad/s]': self.speeds,
+                  'torque [N m]': self.torques} if self.angles.shape[-1] else {
+            'length [m]': self.lengths, 'rate [m/s]': self.rates, 'force [N]': self.forces}
+        return figure_of_legs(curves, times, joints)
 
     def __repr__(self) -> str:
         """Return the numbers of a single sample, or the shape."""
