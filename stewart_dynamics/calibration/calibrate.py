@@ -219,7 +219,7 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
     missing = not_identified(used, what.shares, LARGEST_SHARE, size)
     before, after = (np.sqrt(np.mean(each ** 2, axis=0)) for each in (
         used.at(_with_frames(used, free, of_file)).residuals, found.lin.residuals))
-    if IDENTIFIED not in states and not held.all():  # of frames alone there is none
+    if IDENTIFIED not in states and not held.all():  # frames alone have no numbers
         refuse([PossibleError(
             'identifiable', 'no number is identifiable by itself, with residuals of '
             f'{1e3 * after.max():.3g} mm: {lack[0].text if lack else missing}')])
@@ -228,7 +228,8 @@ def calibrate(platform: StewartPlatform, lengths: ArrayLike, poses: Pose | Motio
         if not validation.after.known:
             raise StewartError('by a fit to the other poses, the hexapod has no pose with the '
                                f'{p.leg_kind.position.field} of any held-out one')
-        # by the file there is none where zeros of the drives are far off: it is worse
+        # Where zeros of the drives are far off, the file has no pose with the positions: it is
+        # worse.
         errors_before, errors_after = (
             math.hypot(each.rms[0], size * each.rms[1]) if each.known else math.inf
             for each in validation)

@@ -14,7 +14,7 @@ from stewart_dynamics.reporting.estimates import EstimationResult, LikelyError
 VERSION = 1  # of calibration.json; increased when the meaning of a key changes
 
 
-class MeasuredPoses(Record):
+class PosesRead(Record):
     """Where the measured poses were taken from."""
 
     source: Annotated[str, means('path of the file or bag')]
@@ -105,7 +105,7 @@ class CalibrationResult(EstimationResult, kw_only=True):
     """The content of calibration.json."""
 
     version: Annotated[int, means('of these keys: 1')] = VERSION
-    poses: MeasuredPoses
+    poses: PosesRead
     options: Options
     not_identified: Annotated[str | None, means('numbers that cannot be distinguished, and why')]
     noise: Annotated[NoiseOfPoses | None, means('null: as many residuals as unknowns')]

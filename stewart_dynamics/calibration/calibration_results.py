@@ -12,11 +12,11 @@ import numpy as np
 
 from stewart_dynamics.calibration.calibrate import Calibration
 from stewart_dynamics.calibration.calibration_record import (
-    CalibrationResult, ErrorsOfPoses, Frame, FramesOfDevice, LegResiduals, MeasuredPoses,
-    NoiseOfPoses, Options, Outlier, ResidualsOfLegs, Validation)
+    CalibrationResult, ErrorsOfPoses, Frame, FramesOfDevice, LegResiduals, NoiseOfPoses, Options,
+    Outlier, PosesRead, ResidualsOfLegs, Validation)
 from stewart_dynamics.calibration.equations import inverse
 from stewart_dynamics.calibration.frames import PoseErrors
-from stewart_dynamics.calibration.measured_poses import MeasuredPoses as Measured
+from stewart_dynamics.calibration.measured_poses import MeasuredPoses
 from stewart_dynamics.estimation.confidence_level import PERCENT
 from stewart_dynamics.legs.calibrated import ALL_GROUPS, CalibratedLegs
 from stewart_dynamics.mechanics.frames.motion import listed, Pose
@@ -28,7 +28,7 @@ from stewart_dynamics.reporting.estimates import (
 from stewart_dynamics.whole_file import now
 
 
-def document(found: Calibration, measured: Measured, source: str, options: Options,
+def document(found: Calibration, measured: MeasuredPoses, source: str, options: Options,
              ) -> CalibrationResult:
     """Return the content of calibration.json."""
     what, kind, lack = found.identifiability, found.parameters.leg_kind, found.lack_of_fit
@@ -36,7 +36,7 @@ def document(found: Calibration, measured: Measured, source: str, options: Optio
     legs, pose = measured.topics or (None, None)
     return of_kind(CalibrationResult, kind)(
         date=now(),
-        poses=MeasuredPoses(
+        poses=PosesRead(
             source, legs, pose, len(measured.names), found.poses,
             [*measured.notices, *measured.notices_of_repeats]),
         options=options,

@@ -31,10 +31,12 @@ def carried(hexapod: Hexapod, tree: Sequence[TreeBody], elements: Mapping[str, A
     Yield the parameters that a reader of a format's elements alone would not find.
 
     tree: as the format has it. elements: values of other elements that are not the parameter's.
-    without: names of parameters that the format has no elements for. The given ones that no format
-    has elements for are added to them.
+    without: names of parameters that the format has no elements for; empty names, of parameters
+    that a kind of legs lacks, are ignored. The given ones that no format has elements for are
+    added to them.
     """
     p, kind = hexapod.parameters, hexapod.kind
+    without = [name for name in without if name]
     in_elements = {*_IN_ELEMENTS, *kind.elements, *kind.shortened, kind.zero, *kind.drive_limits}
     changed = {name: value for name, value in tree_values(hexapod, tree) if name not in without
                and (p[name] is None if name in kind.drive_limits

@@ -11,7 +11,6 @@ follow from the geometry, as those of the node's markers do, and have no influen
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -151,8 +150,8 @@ class Hexapod:
         from_home: whether the format counts the positions of drives from home. Kinds of legs whose
             zero is not a parameter are then counted from the zero of their parameters.
         paired: whether a joint with one limit of position gets the other one as well.
-        unlimited: the limit of rate [m/s, rad/s] and effort [N, N m] of a drive that has none,
-            where the format requires one; None: it requires none.
+        unlimited: rate [m/s, rad/s] and effort [N, N m] of a drive without these limits, where
+            the format requires them.
         """
         base = base or self.base_body
         p, size = self.parameters.geometry, mean_radius(self.parameters.geometry.platform_joints)
@@ -232,11 +231,6 @@ COLORS: dict[str, Color] = {
     'base': (0.3, 0.32, 0.35, 1.0), 'platform': (0.62, 0.7, 0.76, 1.0),
     'lower': (0.45, 0.48, 0.52, 1.0), 'upper': (0.9, 0.9, 0.9, 1.0),
     'joint': (0.12, 0.12, 0.12, 1.0)}
-
-
-def solids(looks: Sequence[VisualShape]) -> list[VisualShape]:
-    """Return which shapes of a body others collide with: not the balls of its joints."""
-    return [shape for shape in looks if shape.kind != 'sphere']
 
 
 def _plate(part: str, joints: Array, size: float) -> tuple[VisualShape, ...]:

@@ -195,7 +195,7 @@ def _assets(root: ET.Element, hexapod: Hexapod, tree: Sequence[TreeBody]) -> Non
 
 def _geoms(body: ET.Element, looks: Sequence[VisualShape]) -> None:
     for shape in looks:
-        for kind in (_VISUAL,) if shape.kind == 'sphere' else (_VISUAL, _COLLISION):
+        for kind in (_VISUAL, _COLLISION) if shape.collides else (_VISUAL,):
             add(body, 'geom', class_=kind, type=shape.kind, pos=shape.position,
                 quat=_quaternion(shape.rotation),
                 material=shape.color if kind == _VISUAL else None,

@@ -70,8 +70,7 @@ def sdf(hexapod: Hexapod, name: str) -> str:
     for leg in hexapod.legs:
         _add_tip(writer, model, hexapod, leg)
     gravity = upright(p.gravity).T @ STANDARD_GRAVITY
-    zero = [hexapod.kind.zero] if hexapod.kind.zero else []
-    for each, parameter in carried(hexapod, tree, {'gravity': gravity}, zero):
+    for each, parameter in carried(hexapod, tree, {'gravity': gravity}, [hexapod.kind.zero]):
         add(model, f'{CARRIED}:parameter', name=each, **parameter._asdict())
     return text_of(root, _COMMENT)
 

@@ -121,8 +121,8 @@ def usd(hexapod: Hexapod, name: str) -> str:
             writer.add_drive(joint, made, not hexapod.kind.zero)
         if part.leg and made.child == part.leg.last:
             writer.close_loop(part.leg, part.body, platform.body, part.leg is not hexapod.legs[0])
-    zero = [hexapod.kind.zero] if hexapod.kind.zero else []
-    for each, parameter in carried(hexapod, tree, _elements(hexapod, tree), zero):
+    for each, parameter in carried(
+            hexapod, tree, _elements(hexapod, tree), [hexapod.kind.zero]):
         for prefix, value in ((VALUE, parameter.value), (ELEMENT, parameter.element)):
             if value:
                 root.GetPrim().CreateAttribute(

@@ -15,7 +15,7 @@ import numpy as np
 
 from stewart_dynamics import __version__
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.hexapod import Color, solids
+from stewart_dynamics.description.hexapod import Color
 from stewart_dynamics.legs.mechanism import (
     BALL, FIXED, HINGE, MechanismBody, SLIDE, UNIVERSAL)
 from stewart_dynamics.legs.tree import VisualShape
@@ -93,7 +93,8 @@ class XmlWriter(ABC):
 
     def add_shapes(self, link: ET.Element, looks: Sequence[VisualShape]) -> None:
         """Add the visual and the collision shapes of a link."""
-        for kind, some in (('visual', looks), ('collision', solids(looks))):
+        for kind, some in (
+                ('visual', looks), ('collision', [each for each in looks if each.collides])):
             for n, shape in enumerate(some, 1):
                 one = add(link, kind, name=f'{kind}_{n}' if self.names else None)
                 self.add_pose(one, shape.position, shape.rotation)

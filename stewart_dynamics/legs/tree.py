@@ -30,6 +30,11 @@ class VisualShape(NamedTuple):
     file: str = ''
     scale: float = 1.0
 
+    @property
+    def collides(self) -> bool:
+        """Return whether others collide with it: not with the balls of joints."""
+        return self.kind != 'sphere'
+
 
 class LegLink(NamedTuple):
     """
